@@ -1,4 +1,4 @@
-"""DriverSlot: a proxy for an RC's driver, so that the driver can be replaced between two calls.
+"""DriverSlot: holds an RC's driver, so that the driver can be replaced between two calls; the RC calls its proxy.
 
 Rules of this file:
 
@@ -26,9 +26,10 @@ SLOTS_KEPT = 64  # chosen: more than the kinds of drivers in one process
 
 
 class DriverSlot:
-    """Proxy for a driver; ``slot_for`` creates it and adds the driver's methods.
+    """The place of an RC's driver.
 
     Attributes:
+        proxy: An object with the driver's methods, and with no other public name, because a driver may use any name.
         works: The driver that works.
         on_trial: Called with the exception when the working driver fails. Returns None if that driver is not on trial;
             otherwise an event that is set when the old driver works again.
@@ -38,6 +39,7 @@ class DriverSlot:
     """
 
     def __init__(self, driver: object) -> None:
+        self.proxy: Any = _proxy_class(type(driver))(self)  # type: ignore[arg-type]  # mypy: classes have no hash
         self.works = driver
         self.on_trial: Callable[[BaseException], asyncio.Event | None] = lambda _error: None
         self.calls, self.is_tried, self.has_device = 0, False, True
@@ -45,10 +47,6 @@ class DriverSlot:
         self._opened.set()
         self._quiet.set()
         self._under_way = 0
-
-    def __getattr__(self, name: str) -> object:
-        found: object = getattr(self.__dict__["works"], name)
-        return found
 
     # ------------------------------------------------------------------ for the exchange
     def shut(self, *, has_device: bool = True) -> None:
@@ -133,20 +131,25 @@ async def _within(within_s: float, call: Awaitable[object]) -> object:
         return await call
 
 
-def slot_for(driver: object) -> DriverSlot:
-    """Return a slot with this driver, which has its methods."""
-    slot: DriverSlot = _slot_class(type(driver))(driver)  # type: ignore[arg-type]  # mypy: classes have no hash
-    return slot
+class _Proxy:
+    """Base class of all proxies."""
+
+    def __init__(self, slot: DriverSlot) -> None:
+        self._slot = slot
+
+    def __getattr__(self, name: str) -> object:
+        found: object = getattr(self.__dict__["_slot"].works, name)
+        return found
 
 
 @functools.lru_cache(maxsize=SLOTS_KEPT)
-def _slot_class(driver: type[Any]) -> type[DriverSlot]:
+def _proxy_class(driver: type[Any]) -> type[_Proxy]:
     methods = {
         name: _waiting(name) if inspect.iscoroutinefunction(method) else _at_once(name)
         for name, method in inspect.getmembers(driver, callable)
         if not name.startswith("_") and not isinstance(method, type)
     }
-    return type("DriverSlot", (DriverSlot,), methods)
+    return type("DriverProxy", (_Proxy,), methods)
 
 
 def methods_of(driver: object) -> set[str]:
@@ -156,15 +159,15 @@ def methods_of(driver: object) -> set[str]:
 
 
 def _waiting(name: str) -> Callable[..., object]:
-    async def method(self: DriverSlot, *arguments: object, **named: object) -> object:
-        return await self.call_later(name, arguments, named)
+    async def method(self: _Proxy, *arguments: object, **named: object) -> object:
+        return await self._slot.call_later(name, arguments, named)
 
     return method
 
 
 def _at_once(name: str) -> Callable[..., object]:
-    def method(self: DriverSlot, *arguments: object, **named: object) -> object:
-        return self.call(name, arguments, named)
+    def method(self: _Proxy, *arguments: object, **named: object) -> object:
+        return self._slot.call(name, arguments, named)
 
     return method
 

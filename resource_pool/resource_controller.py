@@ -42,7 +42,7 @@ from backbone.scheduling.requests import Holder
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of
 from resource_pool.commands import OF_THE_BASE, Command
 from resource_pool.driver_exchange import DriverExchanges
-from resource_pool.driver_slot import slot_for
+from resource_pool.driver_slot import DriverSlot
 from resource_pool.drivers.interface import (
     AdjustableDriver,
     DriverSite,
@@ -105,7 +105,7 @@ class ResourceController(Component[R], Generic[R]):
         self._connects = self._lease_ends = 0
         self._ends = HoldEnds(self)
         self._in_force = self.parameters
-        self._drivers: list[Any] = []
+        self._slots: list[DriverSlot] = []
         self._exchanges = DriverExchanges(self)
         self._changing = asyncio.Lock()
         self._lease_changed = asyncio.Event()
@@ -202,9 +202,9 @@ class ResourceController(Component[R], Generic[R]):
         """
         named = name or self.parameters.driver
         made = self._exchanges.made(lambda site: build_driver(self.driver_kind, named, site), self.driver_site())
-        driver = slot_for(made)
-        self._drivers.append(driver)
-        return driver
+        slot = DriverSlot(made)
+        self._slots.append(slot)
+        return slot.proxy
 
     def admit(self, arc: str, epoch: int) -> Hold:
         """Return the hold that admits the command, and count the command.
@@ -283,10 +283,10 @@ class ResourceController(Component[R], Generic[R]):
             case AskRc():
                 return self.rc_state()
             case SwapClass() as swap:
-                return await self._exchanges.swap(swap, self._drivers)
+                return await self._exchanges.swap(swap, self._slots)
             case _:
-                for driver in self._drivers:
-                    await driver.wait_open()
+                for slot in self._slots:
+                    await slot.wait_open()
                 self._check_sender(asked)
                 return await self.command(asked)
 
@@ -301,14 +301,15 @@ class ResourceController(Component[R], Generic[R]):
         changed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)}
         for_driver = changed & self.driver_parameters
         fixed = changed - self.driver_parameters - {"capacity"}
-        unable = [driver for driver in self._drivers if not isinstance(driver, AdjustableDriver)]
-        if fixed or (for_driver and (unable or not self._drivers)):
+        drivers = [slot.proxy for slot in self._slots]
+        unable = [driver for driver in drivers if not isinstance(driver, AdjustableDriver)]
+        if fixed or (for_driver and (unable or not drivers)):
             raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed or for_driver))} while it runs")
         if for_driver:
             site = self.driver_site()
-            for driver in self._drivers:
+            for driver in drivers:
                 site.options(getattr(driver, "options_type", NoOptions))
-            for driver in self._drivers:
+            for driver in drivers:
                 driver.adjust(site)
         self._in_force = now
         self.changed()
