@@ -90,8 +90,8 @@ class RadioDriver(Protocol):
         """Send the packet and return when it is on the air. Not: queue it. Arguments after ``payload`` are for audits.
 
         Returns:
-            Time on the air, in mission seconds from the call on; the RC manager plans with it if it is longer than
-            declared. None: unknown. Then the duration of this call is used, for an alarm only.
+            Time on the air, in mission seconds from the call on, 0 to 10; the RC manager plans with it if it is longer
+            than declared. None: unknown. Then the duration of this call is used, for an alarm only.
 
         Raises:
             HardwareFault: The packet was not sent.

@@ -32,7 +32,7 @@ from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address, component_of
-from backbone.rc_manager.messages import RcState, StaleEpoch
+from backbone.rc_manager.messages import LONGEST_PACKET_S, RcState, StaleEpoch
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import AnsweringRadio, HardwareFault, RadioDriver
@@ -279,7 +279,7 @@ class CommandRadio(ResourceController[RcParameters]):
         """Send the packet as soon as the air is free; the caller holds the air.
 
         Raises:
-            HardwareFault: The radio did not send the packet.
+            HardwareFault: The radio did not send the packet, or its driver reports an impossible time on the air.
             GivenBeforeStop: The robot was stopped while the packet waited for the air; it was not sent.
         """
         await self.clock.sleep_until_s(self._air_free_s)
@@ -299,7 +299,7 @@ class CommandRadio(ResourceController[RcParameters]):
                 )
         except TimeoutError:
             raise HardwareFault(f"{self.name} accepted no packet within {TRANSMIT_WITHIN_S} s") from None
-        took_s = self.clock.now_s() - begun_s if reported_s is None else reported_s
+        took_s = self.clock.now_s() - begun_s if reported_s is None else self._credible(reported_s)
         self._air_free_s = max(self._air_free_s, begun_s + took_s)
         self._sent += 1
         self._on_air_s += took_s
@@ -309,6 +309,12 @@ class CommandRadio(ResourceController[RcParameters]):
         for news in self._schedule.sent(sending, begun_s, took_s):
             log.warning("%s: %s", packet.arc, news)
             self.publish_event(packet.arc, f"on {self.name}: {news}")
+
+    def _credible(self, reported_s: float) -> float:
+        """Return the driver's time on the air, unless it would block the air for no real reason."""
+        if not 0 <= reported_s <= LONGEST_PACKET_S:
+            raise HardwareFault(f"the driver of {self.name} reports {reported_s} s on the air for one packet")
+        return reported_s
 
     def _measured(self, sending: Sending, took_s: float) -> None:
         """Publish the longest time of these packets if it is new and longer than declared."""

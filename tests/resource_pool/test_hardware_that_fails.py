@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -41,6 +42,24 @@ def test_a_radio_that_breaks_while_it_sends_ends_as_failed_and_says_what_broke(l
             assert isinstance(bug, HardwareFault)
             assert "antenna" in str(bug)
             assert pool.radio_driver.closed == 1
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("reported_s", [math.inf, math.nan, -1.0, 1e9])
+def test_an_impossible_time_on_the_air_ends_the_radio(local_mission: Any, reported_s: float) -> None:
+    """Otherwise an infinite time blocks the air for all robots, also for an emergency stop, and no one learns why."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ROBOTS, manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            pool.radio_driver.slow_s = reported_s
+            await command(pool, "one", 1, Drive(1.0, 1.0))
+            await pool.clock.sleep_s(0.5)
+            assert not pool.is_alive("radio")
+            bug = await pool.outcome("radio")
+            assert isinstance(bug, HardwareFault)
+            assert f"reports {reported_s} s on the air" in str(bug)
 
     run_virtual(main())
 
