@@ -1,6 +1,7 @@
 """Reports of one robot: decodes its replies, publishes its readings, watches its battery.
 
-A reply that cannot be decoded, or has a value out of range, is counted and otherwise ignored.
+A reply that cannot be decoded, or has a value out of range, is counted and otherwise ignored. A number that no message
+can carry, such as the infinite distance of a sonar without an echo, is left out of the readings; the others stay.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import LogLevel
 from backbone.keys import Conversation
+from backbone.ranges import MOST_MEASURE
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import MalformedReply, ReplyReader
 from resource_pool.messages import Readings, Reply
@@ -103,7 +105,8 @@ class RobotReports:
             return
         self._read += 1
         fields = msgspec.structs.asdict(report)
-        values = {name: value for name, value in fields.items() if isinstance(value, bool | int | float)}
+        numbers = {name: value for name, value in fields.items() if isinstance(value, bool | int | float)}
+        values = {name: value for name, value in numbers.items() if abs(value) <= MOST_MEASURE}  # not nan, see ranges
         self._book.put(values, self._clock.now_s())
         self._news.set()
         if BATTERY in values:

@@ -59,6 +59,26 @@ class WildProtocol(SimulatedScoutProtocol):
         return ScoutReports(5.0, 0.0, 0.0)
 
 
+class Sonars(msgspec.Struct, frozen=True):
+    """Reports of a robot with sonars, without ranges in their types."""
+
+    battery_share: float
+    ahead_m: float
+    heading_rad: float
+    echoes: int
+
+
+class SonarProtocol(SimulatedScoutProtocol):
+    """Reads an empty room, without an echo and without a compass, whatever it hears."""
+
+    def read(self, payload: bytes) -> Any:
+        return Sonars(0.5, math.inf, math.nan, 2**70)
+
+
+class SonarScout(Scout):
+    reports = Sonars
+
+
 class SilentProtocol:
     """A protocol of before there were replies."""
 
@@ -374,5 +394,20 @@ def test_values_out_of_their_range_are_malformed_whatever_the_protocol_reads(loc
             assert found["replies_read"] == 0
             assert found["replies_malformed"] >= 3
             assert (await asked(pool)).values == {}
+
+    run_virtual(main())
+
+
+def test_a_number_that_no_message_carries_is_left_out_of_the_readings(local_mission: Any) -> None:
+    """Between processes one infinite value would cost the whole message, and every console all gauges of the robot."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"], rc_classes={"scout": SonarScout}) as pool:
+            await pool.rc("scout1", protocol=f"{HERE}:SonarProtocol")
+            published = overhear(pool, SCOUT1, Conversation.READINGS, Readings)
+            pool.voice("radio").publish(RADIO, Conversation.REPLIES, Reply(1, b"any"))
+            await pool.clock.sleep_s(2.0)
+            assert [told.values for told in published] == [{"battery_share": 0.5}]
+            assert (await asked(pool)).values == {"battery_share": 0.5}
 
     run_virtual(main())
