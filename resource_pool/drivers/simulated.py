@@ -111,7 +111,7 @@ class SimulatedRadio:
             self._replies = self._site.bus.subscribe(own, Conversation.COMMAND, ReplyOnAir, self._heard)
 
     async def close(self) -> None:
-        """Stop receiving replies."""
+        """Stop receiving replies, until ``hear`` is called again."""
         if self._replies is not None:
             self._replies.close()
             self._replies = None

@@ -62,7 +62,7 @@ class SimulatedFramegrabber:
         self._frequency = ""
         self._deliver: Callable[[Picture], None] | None = None
         self._drawing: Future[tuple[Picture, float]] | None = None
-        self._is_new = self._is_closed = False
+        self._is_new = False
         self._taking: set[asyncio.Task[None]] = set()
         self._next_s = -math.inf
         self._pace = PicturePace(site.parameters.frame_rate_hz)
@@ -113,11 +113,9 @@ class SimulatedFramegrabber:
         if self._world is not None:
             self._world.close()
         await end_tasks(*self._taking)
-        if self._is_closed:
-            return
-        self._is_closed = True
-        if self._camera is not None:
-            await self._camera.leave()
+        camera, self._camera = self._camera, None
+        if camera is not None:
+            await camera.leave()
 
     def _world_moved(self, envelope: Envelope[WorldState]) -> None:
         state = envelope.body

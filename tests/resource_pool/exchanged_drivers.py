@@ -9,7 +9,7 @@ import msgspec
 from driver_bench import Bench
 
 from resource_pool.drivers.interface import DriverSite, HardwareFault, Picture
-from resource_pool.drivers.simulated import SimulatedScoutProtocol
+from resource_pool.drivers.simulated import SimulatedRadio, SimulatedScoutProtocol
 
 
 class First:
@@ -120,3 +120,12 @@ class LoudProtocol(SimulatedScoutProtocol):
         if Bench.fault == "call":
             raise ValueError("too loud")
         return super().drive(left_rad_s, right_rad_s)
+
+
+class AbsentRadio(SimulatedRadio):
+    """A radio on a port that is not there, which can be opened once."""
+
+    opens_beside = False
+
+    async def open(self) -> None:
+        raise HardwareFault("no such port")

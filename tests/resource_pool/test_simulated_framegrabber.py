@@ -244,6 +244,21 @@ async def test_neighbors_share_one_renderer_until_the_last_is_closed(counted: ty
     assert counted.still_open == 0
 
 
+async def test_one_that_is_opened_again_draws_and_closes_its_renderer_again(counted: type[CountedCamera]) -> None:
+    """As an exchange of the driver does that brings this one back."""
+    studio = Studio()
+    for times in (1, 2):
+        await studio.driver.open()
+        assert (counted.made, counted.still_open) == (times, 1)
+        pictures, deliver = collector()
+        studio.driver.tune("video", deliver)
+        studio.show(times, {"scout1": "video"})
+        assert (await asyncio.wait_for(pictures.get(), 5.0)).robot == "scout1"
+        await studio.driver.close()
+        assert counted.still_open == 0
+    await studio.close()
+
+
 async def test_neighbors_of_one_renderer_get_each_their_own_pictures(counted: type[CountedCamera]) -> None:
     studios, heard = [Studio() for _ in range(2)], [collector() for _ in range(2)]
     for studio, (_, deliver), frequency in zip(studios, heard, ("red", "blue"), strict=True):

@@ -13,7 +13,7 @@ from driver_bench import Bench
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pool_on_local_network import Pool, WiretappedRadio, a_pool
-from pool_orders import command, connect_robot
+from pool_orders import command, connect, connect_robot
 
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import AskParameters, Parameters, WrongParameter
@@ -208,6 +208,25 @@ def test_a_radio_goes_on_under_the_same_grant(local_mission: Any) -> None:
 
     with the_pool_is_read_anew():
         run_virtual(main())
+
+
+def test_a_radio_that_comes_back_hears_its_robots_again(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1"], manager=False) as pool:
+            await pool.rc("radio", driver="simulated")
+            for rc in ("radio", "scout1"):
+                await connect(pool, rc, "one", 1, lease_s=30.0, companions={"scout1": 1, "radio": 1})
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+            await pool.clock.sleep_s(1.0)
+            swapped = await swap(pool, "AbsentRadio", at="resource_pool/radio")
+            assert "no such port" in swapped.cause
+            heard = pool.running["radio"].statistics()["replies"]
+            assert heard > 0
+            await pool.clock.sleep_s(2.0)
+            assert pool.running["radio"].statistics()["replies"] >= heard + 3
+            assert pool.running["radio"].statistics()["replies_lost"] <= 1
+
+    run_virtual(main())
 
 
 def test_a_grabber_delivers_on_and_only_once(local_mission: Any) -> None:
