@@ -132,14 +132,19 @@ async def _within(within_s: float, call: Awaitable[object]) -> object:
 
 
 class _Proxy:
-    """Base class of all proxies."""
+    """Base class of all proxies; values of the driver are read and set at the driver that works."""
+
+    _slot: DriverSlot
 
     def __init__(self, slot: DriverSlot) -> None:
-        self._slot = slot
+        self.__dict__["_slot"] = slot
 
     def __getattr__(self, name: str) -> object:
         found: object = getattr(self.__dict__["_slot"].works, name)
         return found
+
+    def __setattr__(self, name: str, value: object) -> None:
+        setattr(self._slot.works, name, value)
 
 
 @functools.lru_cache(maxsize=SLOTS_KEPT)

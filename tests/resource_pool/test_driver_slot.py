@@ -50,6 +50,13 @@ def test_a_value_with_a_name_of_the_slot_is_the_drivers(name: str) -> None:
     assert getattr(DriverSlot(type("Door", (), {name: 0.5})()).proxy, name) == 0.5
 
 
+@pytest.mark.parametrize("name", [*OWN_NAMES, "motion"])
+def test_a_value_that_is_set_is_the_drivers(name: str) -> None:
+    driver = type("Door", (), {name: 0.5})()
+    setattr(DriverSlot(driver).proxy, name, 1.0)
+    assert getattr(driver, name) == 1.0
+
+
 class Bell(PaintedLamp):
     """A driver for a lamp that also calls people."""
 

@@ -24,7 +24,7 @@ from backbone.component.abilities import CameraForm
 from backbone.component.launch import Launch
 from backbone.errors import LinkError, Refusal
 from resource_pool.commands import Command, Halt, Move, SwitchTransmitter
-from resource_pool.drivers.interface import DriverSite, MalformedReply
+from resource_pool.drivers.interface import MalformedReply
 from resource_pool.drivers.simulated import SimulatedRobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.messages import DEFAULT_DRIVE_USAGE
@@ -59,10 +59,8 @@ class WalkerParameters(RobotParameters, frozen=True, kw_only=True):
 class WalkerProtocol(SimulatedRobotProtocol):
     """Encodes the walker's packets, and reads its replies."""
 
-    def __init__(self, site: DriverSite) -> None:
-        super().__init__(site)
-        self.motion: Callable[[], StateOfMotion] | None = None
-        """Returns the state of the motion control, for the walker's reports."""
+    motion: Callable[[], StateOfMotion] | None = None
+    """Returns the state of the motion control, for the walker's reports."""
 
     def joints(self, targets_rad: Angles) -> bytes:
         """Return the packet that brings the joints to these angles by the time of the next packet."""
@@ -105,9 +103,8 @@ class WalkerRc(RobotRc[WalkerParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._gait = GAITS[self.parameters.gait]
-        self._control = MotionControl(self._gait)
+        self._control, self._pace = MotionControl(self._gait), Pace(STEP_S)
         self._protocol.motion = self._control.state
-        self._pace = Pace(STEP_S)
         self._walk: _Walk | None = None
         self._begun, self._stepped = asyncio.Event(), asyncio.Event()
 
@@ -116,6 +113,10 @@ class WalkerRc(RobotRc[WalkerParameters]):
         self.start_task(self._step_at_rate(), "motion control")
         self.start_task(self._load_when_stepped(), "joint targets")
         await super().serve()
+
+    async def driver_exchanged(self) -> None:
+        """Let the protocol that works now read the state of the motion control."""
+        self._protocol.motion = self._control.state
 
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Move, halt, or switch the transmitter."""
@@ -171,8 +172,7 @@ class WalkerRc(RobotRc[WalkerParameters]):
         while True:
             await self._stepped.wait()
             self._stepped.clear()
-            walk = self._walk
-            if walk is None:
+            if (walk := self._walk) is None:
                 continue
             try:
                 if self._control.state().is_resting:

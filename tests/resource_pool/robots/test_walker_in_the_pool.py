@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from typing import Any
 
@@ -13,8 +14,9 @@ from walker_pool import ROOM, Trunk, assert_stands, claim, move_for, play, sent,
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.exchange import SwapClass, Swapped
 from backbone.wire import Envelope, Message
-from resource_pool.arc_client import ArcClient
+from resource_pool.arc_client import ArcClient, ask_readings
 from resource_pool.commands import Drive, Jump, SwitchTransmitter
 from resource_pool.messages import NoSuchAction
 from resource_pool.rcs.command_radio import CommandRadio
@@ -112,6 +114,23 @@ def test_it_has_no_command_of_a_scout(local_mission: Any) -> None:
         for missing in (Drive(1.0, 1.0), Jump(), SwitchTransmitter(True, "video")):
             with pytest.raises(NoSuchAction):
                 await arc.command(missing)
+
+    play(local_mission, scene)
+
+
+def test_its_readings_have_the_state_of_its_motion_with_each_protocol(local_mission: Any) -> None:
+    async def scene(pool: Pool, arc: ArcClient, trunk: Trunk) -> None:
+        await move_for(pool, arc, 2.0, 0.3)
+        person = pool.voice_of("ui_console/anna")
+        told = (await ask_readings(person, "walker1")).values
+        assert told["commanded_m_s"] == pytest.approx(0.3)
+        assert told["way_m"] == pytest.approx(trunk.x_m - 2.0, abs=0.2)
+        exchange = SwapClass("resource_pool.robots.walker.rc:WalkerProtocol", {}, 0.5, 2.0)
+        swapping = asyncio.create_task(person.ask("resource_pool/walker1", exchange, Swapped, within_s=10.0))
+        await move_for(pool, arc, 3.0, 0.2)
+        assert (await swapping).is_proved
+        assert (await ask_readings(person, "walker1")).values["commanded_m_s"] == pytest.approx(0.2)
+        assert pool.running["walker1"].statistics()["replies_malformed"] == 0
 
     play(local_mission, scene)
 
