@@ -132,7 +132,7 @@ class Picture:
 
     Attributes:
         captured_s: Mission time.
-        pixels: Grey levels 0 to 255 as bytes, row by row from the top.
+        pixels: Grey levels 0 to 255 as bytes, row by row from the top, contiguous; others end the RC.
         width_px: Columns.
         height_px: Rows.
         transmitters: Number of transmitters on the frequency; -1: unknown to the hardware.

@@ -24,7 +24,7 @@ from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from resource_pool.commands import Command, Tune
-from resource_pool.drivers.interface import FramegrabberDriver, Picture, YieldingDriver
+from resource_pool.drivers.interface import FramegrabberDriver, HardwareFault, Picture, YieldingDriver
 from resource_pool.holds import Hold
 from resource_pool.messages import Accepted, Frame, NothingHeard
 from resource_pool.resource_controller import RcParameters, ResourceController
@@ -154,18 +154,22 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             self._silent_since_s = math.inf
         if not self.is_wanted(picture, order.robot):
             return
+        try:
+            frame = Frame(
+                rc=self.name,
+                arc=hold.arc,
+                epoch=hold.epoch,
+                robot=picture.robot or order.robot,
+                number=next(numbers),
+                captured_s=picture.captured_s,
+                width_px=picture.width_px,
+                height_px=picture.height_px,
+                pixels=_in_a_row(picture.pixels),
+            )
+        except (ValueError, TypeError) as wrong:  # not raised, because a driver may call from a callback that loses it
+            self.fail(HardwareFault(f"the driver of {self.name} delivers a wrong picture: {wrong}"))
+            return
         self._delivered += 1
-        frame = Frame(
-            rc=self.name,
-            arc=hold.arc,
-            epoch=hold.epoch,
-            robot=picture.robot or order.robot,
-            number=next(numbers),
-            captured_s=picture.captured_s,
-            width_px=picture.width_px,
-            height_px=picture.height_px,
-            pixels=picture.pixels,
-        )
         at = address(Subsystem.RESOURCE_POOL, hold.arc)
         self.bus.publish(f"{at}/{order.camera}" if order.camera else at, Conversation.FRAMES, frame)
 
@@ -183,3 +187,16 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             await self.bus.ask(arc, NothingHeard(self.name, hold.epoch), Accepted, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:  # repeated if it is still silent after SILENT_S
             log.info("%s did not switch its transmitter on: %s", hold.arc, error)
+
+
+def _in_a_row(pixels: memoryview) -> memoryview:
+    """Return the pixels as one row of bytes, not copied.
+
+    Raises:
+        ValueError: They are not contiguous in memory.
+        TypeError: They are no buffer.
+    """
+    view = memoryview(pixels)
+    if not view.c_contiguous:
+        raise ValueError("its pixels are not contiguous in memory")
+    return view.cast("B")

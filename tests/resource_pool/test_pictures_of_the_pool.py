@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
+import numpy as np
 import pytest
-from pool_on_local_network import a_pool
+from pool_on_local_network import Pool, a_pool
 from pool_orders import EVERYTHING, at, connect, disconnect
 
 from backbone.bus.clock import run_virtual
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from resource_pool.commands import Tune
+from resource_pool.drivers.interface import HardwareFault, Picture
 from resource_pool.messages import Applied, Frame
 
 
@@ -52,6 +55,51 @@ def test_no_picture_arrives_after_the_disconnection_even_if_the_driver_goes_on(l
             await pool.clock.sleep_s(0.01)
             assert [frame.epoch for frame in heard] == [1]
             assert driver.stops >= 1
+
+    run_virtual(main())
+
+
+WRONG = {
+    "color": (np.zeros((4, 6, 3), np.uint8).reshape(-1).data, "72 pixels for 6 x 4"),
+    "numbers of eight bytes": (np.zeros((4, 6)).data, "192 pixels for 6 x 4"),
+    "every second row": (np.zeros((8, 6), np.uint8)[::2].data, "not contiguous"),
+    "a list": ([0] * 24, "bytes-like object"),
+}
+
+
+async def delivered(pool: Pool, pixels: Any) -> list[Frame]:
+    """Return what arrives of one picture of 6 x 4 that a driver delivers from its thread."""
+    heard: list[Frame] = []
+    pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
+    await connect(pool, "grabber", "one", 1)
+    await pool.voice("one").ask(at("grabber"), Tune("video").under("one", 1), Applied, within_s=1)
+    deliver = pool.grabber_driver.deliver
+    asyncio.get_running_loop().call_soon_threadsafe(deliver, Picture(pool.clock.now_s(), pixels, 6, 4))
+    await pool.clock.sleep_s(0.1)
+    return heard
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_a_driver_that_delivers_other_pixels_than_it_says_ends_the_rc(local_mission: Any, kind: str) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["grabber"], manager=False) as pool:
+            pixels, told = WRONG[kind]
+            assert await delivered(pool, pixels) == []
+            assert pool.running["grabber"].statistics()["frames_delivered"] == 0
+            assert not pool.is_alive("grabber")
+            bug = await pool.outcome("grabber")
+            assert isinstance(bug, HardwareFault)
+            assert told in str(bug)
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("pixels", [bytes(range(24)), np.arange(24, dtype=np.uint8).reshape(4, 6)])
+def test_pixels_may_come_as_bytes_or_in_rows(local_mission: Any, pixels: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["grabber"], manager=False) as pool:
+            [frame] = await delivered(pool, pixels)
+            assert bytes(frame.pixels) == bytes(range(24))
 
     run_virtual(main())
 
