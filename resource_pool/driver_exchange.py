@@ -42,6 +42,7 @@ from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions
 
 log = logging.getLogger(__name__)
 
+OPENS_AGAIN_WITHIN_S = 20.0  # chosen: as a component has to become ready; machine seconds
 CLOSES_WITHIN_S = 2.0  # chosen: a device that does not close by then hangs; machine seconds
 
 
@@ -274,7 +275,7 @@ class DriverExchanges:
         if not going.is_beside:
             await self._close(going.new)
             try:
-                await _open(going.old)
+                await self._open_again(going.old)
             except HardwareFault as fault:
                 self._put_back(going)
                 self._rc.fail(fault)  # its creator starts it again, and it opens the device
@@ -287,6 +288,18 @@ class DriverExchanges:
         if going.is_beside:
             await self._close(going.new)
         return remark_on_file(self._rc.name, old, new)
+
+    async def _open_again(self, old: object) -> None:
+        """Open the old driver again.
+
+        Raises:
+            HardwareFault: It cannot be opened, or hangs.
+        """
+        try:
+            async with asyncio.timeout(OPENS_AGAIN_WITHIN_S):
+                await _open(old)
+        except TimeoutError:
+            raise HardwareFault(f"{class_path_of(old)} did not open again within {OPENS_AGAIN_WITHIN_S:g} s") from None
 
     async def _proved(self, going: _DriverExchange) -> str:
         going.slot.is_tried, going.course.rounds = False, going.slot.calls

@@ -61,6 +61,14 @@ class Second(First):
         await super().set_brightness(share)
 
 
+class Sticky(First):
+    """Hangs when it is opened again."""
+
+    async def open(self) -> None:
+        await super().open()
+        self.open = asyncio.Event().wait  # type: ignore[assignment,method-assign]
+
+
 class FirstBeside(First):
     opens_beside = True
 

@@ -118,6 +118,22 @@ def test_the_old_driver_does_what_the_new_one_cannot(local_mission: Any, old: st
     bench(local_mission, old, scene)
 
 
+def test_an_old_driver_that_hangs_when_it_is_opened_again_ends_the_rc(local_mission: Any) -> None:
+    """Otherwise the RC never does a call again, nor reaches its safe state, and nothing starts it anew."""
+
+    async def scene(pool: Pool) -> None:
+        Bench.fault = "open"
+        swapping = asyncio.create_task(swap(pool, "Second"))
+        await pool.clock.sleep_s(30.0)
+        assert not pool.is_alive("lamp1")
+        bug = await pool.outcome("lamp1")
+        assert isinstance(bug, HardwareFault)
+        assert "Sticky did not open again" in str(bug)
+        await asyncio.gather(swapping, return_exceptions=True)
+
+    bench(local_mission, "Sticky", scene)
+
+
 def test_refusals_change_nothing(local_mission: Any) -> None:
     async def scene(pool: Pool) -> None:
         with pytest.raises(WrongClass, match="lacks close, open, set_brightness"):
