@@ -183,13 +183,20 @@ def _field_form(field: msgspec.inspect.Field, doc: str, limits: tuple[float, flo
         field.name,
         kind,
         unit_of(field.name),
-        least,
-        most,
-        field.default if isinstance(field.default, bool | int | float | str) else 0.0,
+        max(-UNLIMITED, least),
+        min(UNLIMITED, most),
+        _default(field.default),
         field.required,
         choices,
         doc,
     )
+
+
+def _default(default: object) -> bool | int | float | str:
+    """Return the default if a message can carry it; 0 otherwise, also for nan."""
+    if isinstance(default, int | float):
+        return default if abs(default) <= UNLIMITED else 0.0
+    return default if isinstance(default, str) else 0.0
 
 
 def _kind(kind: msgspec.inspect.Type) -> tuple[ValueKind, list[str]]:

@@ -74,8 +74,14 @@ def arrange(question: UnitsQuestion) -> Arranged:
 def _asked(class_paths: Sequence[str]) -> tuple[dict[str, ClassFacts], str]:
     """Return the answers up to the first class that ended or blocked the process, and the reason for that."""
     printed, reason = _printed("facts", class_paths)
-    answers = [msgspec.json.decode(line, type=ClassFacts) for line in printed]
-    return dict(zip(class_paths, answers, strict=False)), reason
+    return dict(zip(class_paths, map(_facts, printed), strict=False)), reason
+
+
+def _facts(line: bytes) -> ClassFacts:
+    try:
+        return msgspec.json.decode(line, type=ClassFacts)
+    except msgspec.ValidationError as error:  # such as more choices than a message carries
+        return ClassFacts(failure=f"what it declares cannot be read: {error}")
 
 
 def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:

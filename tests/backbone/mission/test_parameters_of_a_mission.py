@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from backbone.component.abilities import UNLIMITED
 from backbone.mission import class_asking
 from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of, shipped_classes
@@ -124,6 +125,47 @@ def test_rules_of_a_class_are_asked_once_for_the_same_parameters(modules: Path) 
     assert fault.message == "own mine refuses its parameters: 2.5 is too deep"
     (modules / "own_rule.py").write_text("raise SystemError\nclass Own: ...")
     assert faults_in(modules, text) == [fault]
+
+
+ABLE = """
+import math
+from typing import Literal
+import msgspec
+from backbone.component.abilities import Abilities, field_forms
+from backbone.component.component import Component
+
+class Reports(msgspec.Struct):
+    depth_m: float = math.nan
+    way_m: float = -math.inf
+    echoes: int = 2**70
+    mode: Literal[WORDS] = "w0"
+
+class Own(Component):
+    @classmethod
+    def abilities(cls):
+        return Abilities(reports=field_forms(Reports, limits={"way_m": (-math.inf, math.inf), "echoes": (0, 2**70)}))
+"""
+
+
+def able(words: int) -> str:
+    return ABLE.replace("WORDS", ", ".join(f'"w{number}"' for number in range(words)))
+
+
+def test_limits_and_defaults_without_an_end_are_those_of_all_numbers(modules: Path) -> None:
+    """JSON and messages have no infinity; a lab's RC writes one where its hardware has no limit."""
+    (modules / "own_endless.py").write_text(able(2))
+    facts = ask_classes(["own_endless:Own"])["own_endless:Own"]
+    assert facts.failure == ""
+    depth, way, echoes, mode = facts.abilities.reports
+    assert (way.least, way.most) == (-UNLIMITED, UNLIMITED)
+    assert (echoes.least, echoes.most) == (0.0, UNLIMITED)
+    assert [one.default for one in (depth, way, echoes, mode)] == [0.0, 0.0, 0.0, "w0"]
+
+
+def test_a_class_that_declares_too_much_is_a_fault_at_its_type(modules: Path) -> None:
+    (modules / "own_wordy.py").write_text(able(300))
+    [fault] = faults_in(modules, with_own_type("own_wordy:Own"))
+    assert "own_wordy:Own: what it declares cannot be read: Expected `array` of length <= 256" in fault.message
 
 
 @pytest.mark.thorough
