@@ -87,7 +87,7 @@ class SimulatedFramegrabber:
         paints_first = wanted == "auto" and not support.has_card
         lasts = isinstance(asyncio.get_running_loop(), VirtualLoop)
         camera = SharedCamera.join(world.mjcf, support.backend, paints_first=paints_first, lasts=lasts)
-        self._camera, self._is_closed = camera, False
+        self._camera = camera
         try:
             self._studio = await run(camera.thread, lambda: _Studio(world, camera.opened(), keeps_noise=lasts))
         except Exception:  # mujoco's import raises errors of many kinds where OpenGL is missing

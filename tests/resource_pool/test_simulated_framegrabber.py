@@ -291,13 +291,3 @@ async def test_a_renderer_that_does_not_open_fails_each_neighbor_and_the_next_tr
     assert counted.still_open == 1
     await again.close()
     assert counted.still_open == 0
-
-
-async def test_a_driver_that_comes_back_gives_its_camera_back_each_time(counted: type[CountedCamera]) -> None:
-    studio = Studio()
-    for _ in range(2):
-        await studio.driver.open()
-        assert counted.still_open == 1
-        await studio.driver.close()
-        assert counted.still_open == 0
-    await studio.close()
