@@ -42,10 +42,10 @@ LATENCY_STEP = (
 )
 
 Asked = protocol.WhyRequest | protocol.ParametersRequest | protocol.SetRequest | protocol.SearchLog
+Stop = protocol.StopRequest | protocol.StopAllRequest
 AtWork = (
     Asked
-    | protocol.StopRequest
-    | protocol.StopAllRequest
+    | Stop
     | protocol.LiftRequest
     | protocol.OrderRequest
     | protocol.PictureOrder
@@ -107,6 +107,7 @@ class Operator:
         self._ordering = Ordering(services.team)
         self._latency_s: dict[str, float] = {}
         self._work: dict[bytes, asyncio.Task[None]] = {}
+        self._stops: dict[bytes, asyncio.Task[None]] = {}
 
     # ------------------------------------------------------------------ messages of the browser
     def obey(self, intent: protocol.Intent) -> None:
@@ -164,14 +165,19 @@ class Operator:
         self._console.act(Teleoperation.stop)
 
     async def leave(self, reason: str) -> None:
-        """Stop the wheels and release the robot; afterwards the operator is gone."""
-        work = list(self._work.values())
+        """Stop the wheels and release the robot; afterwards the operator is gone, and no emergency stop is under way.
+
+        Emergency stops are carried out to their end, because their operator expects robots to stand.
+        """
+        stops, work = list(self._stops.values()), list(self._work.values())
         for task in work:
             task.cancel()
         if work:
             await asyncio.wait(work)
         self.is_there = False
         await self._console.leave(reason)
+        if stops:
+            await asyncio.wait(stops)
         self._services.watching_changed()
         self._services.sights_changed()
         self._services.attention_changed()
@@ -283,14 +289,15 @@ class Operator:
 
     def _begin(self, intent: AtWork) -> None:
         same = msgspec.json.encode(intent)
-        if same in self._work:
+        work = self._stops if isinstance(intent, Stop) else self._work
+        if same in work:
             return
         if isinstance(intent, Asked) and len(self._work) >= MOST_ASKED:
             self._answer({"refused": "too much is being asked at once; wait for the answers"})
             return
         task = asyncio.create_task(self._do(intent), name=f"{self.welcome.user}:{type(intent).__name__}")
-        self._work[same] = task
-        task.add_done_callback(lambda done: self._done(same, done))
+        work[same] = task
+        task.add_done_callback(lambda done: self._done(work, same, done))
 
     async def _do(self, intent: AtWork) -> None:
         observer, user = self._services.observer, self.welcome.user
@@ -369,8 +376,8 @@ class Operator:
     def _show_failed(self, error: Refusal | LinkError) -> None:
         self.show(failed(self._services.clock.now_s(), error))
 
-    def _done(self, same: bytes, task: asyncio.Task[None]) -> None:
-        self._work.pop(same, None)
+    def _done(self, work: dict[bytes, asyncio.Task[None]], same: bytes, task: asyncio.Task[None]) -> None:
+        work.pop(same, None)
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._services.observer.fail(bug)
 

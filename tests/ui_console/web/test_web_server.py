@@ -96,6 +96,17 @@ async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back
         await stage.placer.wait(lambda: not stage.hub.clients)
 
 
+@pytest.mark.parametrize("stop", [{"do": "stop_robot", "robot": "scout1"}, {"do": "stop_all"}], ids=["one", "all"])
+async def test_an_emergency_stop_is_carried_out_although_its_page_vanishes(stage: Stage, stop: dict[str, str]) -> None:
+    stage.place_robots("scout1")
+    async with stage.browser() as anna:
+        await anna.wait(lambda: anna.view["robots"], "known")
+        await anna.say(**stop)
+        anna.socket.transport.abort()
+        await stage.placer.wait(lambda: not stage.hub.clients, WITHIN_S)
+        await stage.placer.wait(lambda: stage.robots["scout1"].is_stopped, WITHIN_S)
+
+
 async def test_who_loses_the_robot_is_told_who_took_it_and_why(stage: Stage) -> None:
     stage.grant_all()
     async with stage.browser(LOW) as ben:
