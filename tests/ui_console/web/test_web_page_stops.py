@@ -135,6 +135,17 @@ async def test_who_lifts_anothers_stop_reads_whose_it_is_and_that_one_is_asked(s
                 await page.locator("#asked").get_by_text("ben keeps scout1 stopped").wait_for()
 
 
+async def test_who_stopped_a_robot_reads_that_a_yes_lets_it_move(stage: Stage) -> None:
+    async with page_at(stage) as page, stage.browser(LOW) as ben:
+        await stop_button(page).click()
+        await wait_stopped(page)
+        await ben.say(do="lift", robot="scout1", number=stage.robots["scout1"].latch.state.number)
+        asked = page.get_by_role("alertdialog", name="ben asks whether scout1, which you stopped, may move again")
+        await asked.get_by_role("button", name="Keep it stopped").wait_for()
+        await asked.get_by_role("button", name="Let it move").click()
+        await wait_free(page)
+
+
 @pytest.mark.parametrize("hand", rest_thorough(HANDS))
 async def test_what_is_held_through_a_stop_and_its_end_moves_nothing_before_it_is_pressed_anew(
     stage: Stage, hand: str

@@ -191,7 +191,10 @@ export class Hand {
     if (consent === null) return;
     const others = consent.others ? `, ${consent.others} more ask` : "";
     const left = `${Math.ceil(consent.left_s)} s${others}`;
-    set(find("consent-line"), `${consent.user} asks for ${consent.robot}: ${consent.why} (${left})`);
+    set(find("consent-line"), `${consent.line} (${left})`);
+    const isLift = consent.topic === "lift";
+    set(find("consent-yes"), isLift ? "Let it move" : "Let them have it");
+    set(find("consent-no"), isLift ? "Keep it stopped" : "Keep it");
   }
 }
 
