@@ -2,7 +2,8 @@
 
 Rules of this file: no bus, no clock, no screen; times are mission seconds and arguments.
 
-* An asker has at most one open question of each topic here; questions are answered in order of arrival.
+* A person at a console has at most one open question of each topic here; questions are answered in order of arrival.
+  Several people ask by one console if that console serves their pages.
 * Each question gets exactly one answer. If a question times out, the answer is no, and nothing changes.
 * A yes that releases the robot answers only the first question for it; the other askers get the name of the first
   asker.
@@ -66,7 +67,7 @@ class Consent(Message, frozen=True):
 
 
 class AskedAlready(Refusal):
-    """This asker's question is still open; fact: ``asker``."""
+    """This person's question is still open; fact: ``asker``."""
 
     code = "consent.asked"
     remedy = "Wait for the answer; there is one within seconds."
@@ -123,6 +124,11 @@ class Sought:
     until_s: float
     topic: Topic = Topic.TAKE
 
+    @property
+    def key(self) -> tuple[str, str, Topic]:
+        """Console, person and topic, which no other open question has."""
+        return self.asker, self.user, self.topic
+
 
 @dataclass(frozen=True, slots=True)
 class Settled:
@@ -156,11 +162,11 @@ class ConsentDesk:
         """Open a question.
 
         Raises:
-            AskedAlready: A question of this asker on this topic is open.
+            AskedAlready: A question of this person at this console on this topic is open.
             TooManyAsk: ``MOST_OPEN`` questions are open.
         """
-        if any((one.asker, one.topic) == (sought.asker, sought.topic) for one in self._open):
-            raise AskedAlready(f"{sought.asker} has asked already", asker=sought.asker)
+        if any(one.key == sought.key for one in self._open):
+            raise AskedAlready(f"{sought.user} has asked already", asker=sought.asker)
         if len(self._open) >= MOST_OPEN:
             raise TooManyAsk(f"{self._user} is being asked by {MOST_OPEN} already")
         self._open.append(sought)

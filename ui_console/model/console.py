@@ -72,7 +72,7 @@ class ConsoleModel:
         """Whether pictures are expected while a robot is held; settable: a page may show other ones meanwhile."""
         self._address = f"{Subsystem.UI_CONSOLE}/{name}"
         self._pictures: dict[str, deque[events.PictureSeen]] = {}
-        self._sought: dict[tuple[str, Topic], Sought] = {}
+        self._sought: dict[tuple[str, str, Topic], Sought] = {}
         self.moment = 0
         """Grows at each event after which older key presses are ignored."""
         self._must_let_go = False
@@ -289,10 +289,10 @@ class ConsoleModel:
                 self._asked_whom, self._heard = event, []
             case events.ConsentHeard():
                 self._heard.append(event)
-            case Sought(asker=asker, topic=topic):
-                self._sought[asker, topic] = event
+            case Sought(key=key):
+                self._sought[key] = event
             case Settled(sought=sought):
-                self._sought.pop((sought.asker, sought.topic), None)
+                self._sought.pop(sought.key, None)
             case events.LetGoNeeded(is_needed=is_needed):
                 self._must_let_go = is_needed
             case events.MomentBegan():

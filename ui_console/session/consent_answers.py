@@ -39,7 +39,7 @@ class ConsentAnswers:
     def __init__(self, user: str, clock: Clock, show: Callable[[ConsoleEvent], None], acted: Acted) -> None:
         self._user, self._clock, self._show, self._acted = user, clock, show, acted
         self._desk = ConsentDesk(user)
-        self._answers: dict[tuple[str, Topic], asyncio.Future[Consent]] = {}
+        self._answers: dict[tuple[str, str, Topic], asyncio.Future[Consent]] = {}
         self.yield_robot: Callable[[list[Settled]], None] = self.settle
         """Called with the settled questions if the robot must be released; it calls ``settle`` afterwards."""
 
@@ -60,7 +60,7 @@ class ConsentAnswers:
         until_s = now_s + CONSENT_WITHIN_S * self._clock.rate
         sought = self._desk.open_question(Sought(asker, user, robot, why, until_s, topic))
         answer: asyncio.Future[Consent] = asyncio.get_running_loop().create_future()
-        self._answers[asker, topic] = answer
+        self._answers[sought.key] = answer
         self._show(sought)
         try:
             async with asyncio.timeout(CONSENT_WITHIN_S):
@@ -94,7 +94,7 @@ class ConsentAnswers:
     def settle(self, settled: list[Settled]) -> None:
         """Return the answers, and remove the questions from the screens."""
         for one in settled:
-            answer = self._answers.pop((one.sought.asker, one.sought.topic), None)
+            answer = self._answers.pop(one.sought.key, None)
             if answer is not None and not answer.done():
                 answer.set_result(one.consent)
             self._show(one)

@@ -115,6 +115,22 @@ def test_one_page_asks_another_of_the_same_server_and_reads_the_answer(stage: Ca
     stage(scene)
 
 
+def test_two_people_at_pages_of_one_server_ask_at_the_same_time(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        anna, ben, cleo = (on.hub.enter(Welcome(name, 100)) for name in ("anna", "ben", "cleo"))
+        await on.hub.observer.stop_robot("scout1", "", "anna")
+        for page in (ben, cleo):
+            page.obey(LiftRequest("scout1", on.robot.latch.state.number))
+        await on.until(lambda: on.question(anna) and on.question(anna).others == 1)
+        for page in (ben, cleo):
+            assert on.question(anna).user == page.welcome.user
+            anna.obey(Decide(False))
+            await on.until(lambda page=page: "anna keeps scout1 stopped" in page.model.own(on.clock.now_s()).asked)  # type: ignore[misc]
+        assert on.question(anna) is None
+
+    stage(scene)
+
+
 def test_the_remedy_of_a_stop_names_the_pages_button(stage: Callable[[Scene], None]) -> None:
     page = resources.files("ui_console.web").joinpath("page", "cards.js").read_text()
 
