@@ -105,6 +105,12 @@ def _focus(selector: str, reveal: str = "") -> Place:
     return Place(f"focus on {selector}", selector, script, close="document.activeElement.blur()")
 
 
+def _answer(selector: str) -> Place:
+    """Return an answer to a question; the page enables it when a person could have read the question."""
+    focused = f"(document.querySelector('{selector}:enabled')?.focus(), document.activeElement.matches('{selector}'))"
+    return replace(_focus(selector), shows=focused, needs="asked")
+
+
 def _revealed(area: str, selector: str, more: str = "") -> Place:
     area = f"document.getElementById('{area}')"
     shown = _focus(selector, f"{area}.hidden = false; {more}")
@@ -154,7 +160,7 @@ PAGE = (
     *(_revealed("lost", selector) for selector in ("#retake", "#dismiss")),
     _revealed("kinds", "#kind"),
     _revealed("kinds", "#take-so", "document.getElementById('take-so').disabled = false; "),
-    *(replace(_focus(selector), needs="asked") for selector in ("#consent-yes", "#consent-no")),
+    *map(_answer, ("#consent-yes", "#consent-no")),
     *map(_log_field, LOG_FIELDS),
     *(_card(part, ROBOT) for part in ("take", "stop_robot", "why")),
     *(_card(part, OTHERS[0]) for part in ("take", "stop_robot", "why", "enlarge")),

@@ -252,7 +252,7 @@ async def test_by_one_touch_a_page_asks_an_equal_for_the_robot_and_lets_an_equal
         await page.locator("#may-i:enabled").tap()
         await erna.wait(lambda: erna.view["own"]["consent"], "erna is asked")
         assert erna.view["own"]["consent"]["user"] == "phone"
-        await erna.say(do="decide", is_given=True)
+        await erna.say(do="decide", is_given=True, number=erna.view["own"]["consent"]["number"])
         await page.wait_for_selector("body[data-held=scout1]")
 
         await erna.say(do="take", robot="scout1")

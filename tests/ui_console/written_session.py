@@ -77,8 +77,8 @@ class WrittenSession(Session):
     def ask_consent(self, why: str = "") -> None:
         self.wanted.append(("may I", why))
 
-    def decide(self, is_given: bool) -> None:
-        self.wanted.append(("decide", is_given))
+    def decide(self, is_given: bool, number: int) -> None:
+        self.wanted.append(("decide", is_given, number))
 
     async def switch(self, robot: str) -> None:
         self.wanted.append(("switch", robot))

@@ -4,6 +4,7 @@ Rules of this file: no bus, no clock, no screen; times are mission seconds and a
 
 * A person at a console has at most one open question of each topic here; questions are answered in order of arrival.
   Several people ask by one console if that console serves their pages.
+* A person answers the question on the screen, by its number: an answer that comes late never answers the next question.
 * Each question gets exactly one answer. If a question times out, the answer is no, and nothing changes.
 * A yes that releases the robot answers only the first question for it; the other askers get the name of the first
   asker.
@@ -12,8 +13,9 @@ Rules of this file: no bus, no clock, no screen; times are mission seconds and a
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated
 
@@ -115,6 +117,7 @@ class Sought:
         why: The reason, for people.
         until_s: Mission time at which the question times out; the answer is then no.
         topic: To have the robot, or to lift its stop.
+        number: Number of the question at the desk, from 1; 0: it is not open yet.
     """
 
     asker: str
@@ -123,6 +126,7 @@ class Sought:
     why: str
     until_s: float
     topic: Topic = Topic.TAKE
+    number: int = 0
 
     @property
     def key(self) -> tuple[str, str, Topic]:
@@ -148,6 +152,7 @@ class ConsentDesk:
     def __init__(self, user: str) -> None:
         self._user = user
         self._open: list[Sought] = []
+        self._numbers = itertools.count(1)
 
     @property
     def open(self) -> Sequence[Sought]:
@@ -159,7 +164,7 @@ class ConsentDesk:
         return self.open_question(Sought(asker, asked.user, asked.robot, asked.why, now_s + within_s))
 
     def open_question(self, sought: Sought) -> Sought:
-        """Open a question.
+        """Open a question, and return it with its number.
 
         Raises:
             AskedAlready: A question of this person at this console on this topic is open.
@@ -169,12 +174,19 @@ class ConsentDesk:
             raise AskedAlready(f"{sought.user} has asked already", asker=sought.asker)
         if len(self._open) >= MOST_OPEN:
             raise TooManyAsk(f"{self._user} is being asked by {MOST_OPEN} already")
-        self._open.append(sought)
-        return sought
+        opened = replace(sought, number=next(self._numbers))
+        self._open.append(opened)
+        return opened
 
-    def decide(self, is_given: bool, reason: str = "") -> list[Settled]:
-        """Answer the first question; a yes for the robot settles all others for it, too. Return all settled ones."""
-        if not self._open:
+    def decide(self, is_given: bool, reason: str = "", number: int | None = None) -> list[Settled]:
+        """Answer the first question; a yes for the robot settles all others for it, too. Return all settled ones.
+
+        Args:
+            is_given: The answer.
+            reason: For people.
+            number: The question on the person's screen; if it is not the first one, none is answered. None: the first.
+        """
+        if not self._open or number not in (None, self._open[0].number):
             return []
         first, others = self._open[0], self._open[1:]
         settled = [Settled(first, Consent(is_given, self._user, reason))]

@@ -208,6 +208,7 @@ class ConsoleModel:
             others=len(others),
             topic=first.topic,
             line=_question_line(first),
+            number=first.number,
         )
 
     def asked_line(self, now_s: float) -> str:

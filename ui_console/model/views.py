@@ -281,6 +281,7 @@ class ConsentView(msgspec.Struct, frozen=True):
         others: Number of further questions.
         topic: ``take``: to get the robot; ``lift``: to let it move again.
         line: The question in one sentence, for people.
+        number: Number of the question, which the answer names.
     """
 
     user: str
@@ -290,6 +291,7 @@ class ConsentView(msgspec.Struct, frozen=True):
     others: int
     topic: str
     line: str
+    number: int
 
 
 class LostView(msgspec.Struct, frozen=True):

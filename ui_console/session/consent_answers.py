@@ -69,11 +69,17 @@ class ConsentAnswers:
             self.settle(self._desk.expire(max(self._clock.now_s(), sought.until_s)))
             return Consent(False, self._user, "no answer")
 
-    def decide(self, is_given: bool, reason: str = "") -> None:
-        """Answer the first question; a yes for the robot releases it."""
-        settled = self._desk.decide(is_given, reason)
+    def decide(self, is_given: bool, reason: str = "", number: int | None = None) -> bool:
+        """Answer the first question; a yes for the robot releases it. Return whether there was such a question.
+
+        Args:
+            is_given: The answer.
+            reason: For people.
+            number: See ``ConsentDesk.decide``.
+        """
+        settled = self._desk.decide(is_given, reason, number)
         if not settled:
-            return
+            return False
         sought = settled[0].sought
         detail = f"asked by {sought.user}{f', {reason}' if reason else ''}"
         self._acted(_ACTIONS[sought.topic, is_given], sought.robot, detail, self._user)
@@ -81,6 +87,7 @@ class ConsentAnswers:
             self.yield_robot(settled)
         else:
             self.settle(settled)
+        return True
 
     def ended(self, is_given: bool, reason: str) -> None:
         """Answer all questions for the robot, because this console no longer holds it.

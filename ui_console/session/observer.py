@@ -123,9 +123,9 @@ class Observer(Component[P_co], Generic[P_co]):
         """
         return await LiftTalk(self, user or self.user, show or self.show).lift(robot, number)
 
-    def decide(self, is_given: bool, reason: str = "") -> None:
-        """Answer the first question to this operator: for the held robot, or to lift a stop."""
-        self.answers.decide(is_given, reason)
+    def decide(self, is_given: bool, reason: str = "", number: int | None = None) -> None:
+        """Answer the first question to this operator: for the held robot, or to lift a stop; see ``ConsentDesk``."""
+        self.answers.decide(is_given, reason, number)
 
     async def set_parameter(self, name: str, parameter: str, value: object, user: str = "") -> bool:
         """Set a parameter of a component; return whether the component applied it."""

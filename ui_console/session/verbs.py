@@ -114,10 +114,10 @@ class Session:
         """Ask the operator who holds the robot for it."""
         self._with_robot(lambda console: console.begin_ask_consent(why))
 
-    def decide(self, is_given: bool) -> None:
-        """Answer the operator who asks for the robot, or to lift a stop."""
+    def decide(self, is_given: bool, number: int) -> None:
+        """Answer the operator who asks for the robot, or to lift a stop: the question of this number, and no other."""
         if self._console is not None and self._console.state is LifeState.READY:
-            self._console.decide(is_given)
+            self._console.decide(is_given, number=number)
 
     def require_let_go(self) -> None:
         """Ignore held controls until they were released and pressed again."""

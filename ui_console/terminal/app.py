@@ -155,8 +155,9 @@ class ConsoleApp(ConsoleDisplay):
         self._open(LineQuestion("may I have it, because"), self._session.ask_consent)
 
     def action_decide(self, is_given: bool) -> None:
-        """Give the robot to the operator who asks, or keep it."""
-        self._session.decide(is_given)
+        """Answer the question on the screen, if there is one; a later question is answered by a later press."""
+        if self._view is not None and self._view.own.consent is not None:
+            self._session.decide(is_given, self._view.own.consent.number)
 
     def on_app_blur(self, _event: AppBlur) -> None:
         """Stop the wheels when the window loses the focus, because it gets no key events after that."""

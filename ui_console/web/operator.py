@@ -141,8 +141,9 @@ class Operator:
                 self._attend(is_there)
             case protocol.MayI(why):
                 self._console.act(lambda console: console.begin_ask_consent(why))
-            case protocol.Decide(is_given):
-                self.answers.decide(is_given)
+            case protocol.Decide(is_given, number):
+                if not self.answers.decide(is_given, number=number):
+                    self._answer({"refused": "no answer was given: that question is over"})
             case protocol.DismissLost():
                 self.model.dismiss_lost()
                 self.refresh(self._services.clock.now_s())

@@ -134,9 +134,14 @@ class MayI(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="d
 
 
 class Decide(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="decide"):
-    """Answer an operator's question for the robot (a yes releases it) or for the lift of a stop."""
+    """Answer an operator's question for the robot (a yes releases it) or for the lift of a stop.
+
+    Attributes:
+        number: Number of the question on the page; if another one is open now, it is not answered.
+    """
 
     is_given: bool
+    number: Numbered
 
 
 class DismissLost(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="dismiss_lost"):

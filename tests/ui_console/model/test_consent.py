@@ -13,6 +13,7 @@ steps = st.lists(
     st.one_of(
         st.tuples(st.just("seek"), st.integers(0, 3)),
         st.tuples(st.just("decide"), st.booleans()),
+        st.tuples(st.just("decide_late"), st.integers(0, 3)),
         st.tuples(st.just("wait"), st.floats(0, 10)),
         st.tuples(st.just("ended"), st.booleans()),
     ),
@@ -43,6 +44,11 @@ def test_each_question_gets_exactly_one_answer_and_none_stays_open_longer_than_p
                     [first] if with_what and first else []
                 )
                 settled += [answer.sought for answer in answers]
+            case "decide_late":
+                is_over = all(one.number != with_what for one in desk.open[:1])
+                answers = desk.decide(True, number=int(with_what))
+                assert (answers == []) is is_over, "only the first question is answered by its number"
+                settled += [answer.sought for answer in answers]
             case "wait":
                 now_s += with_what
                 late = desk.expire(now_s)
@@ -65,6 +71,16 @@ def test_a_yes_is_for_the_first_and_the_others_hear_for_whom() -> None:
     assert (yes.sought.user, yes.consent.is_given, yes.consent.user) == ("cleo", True, "anna")
     assert (other.sought.user, other.consent.is_given, other.consent.reason) == ("dan", False, "cleo may have it")
     assert desk.decide(True) == []
+
+
+def test_an_answer_to_a_question_that_is_over_answers_no_other() -> None:
+    desk = ConsentDesk("anna")
+    to_ben = desk.seek("ui_console/ben", ASK, 1.0).number
+    desk.expire(1.0 + CONSENT_WITHIN_S)
+    to_cleo = desk.seek("ui_console/cleo", AskConsent("scout1", "cleo", ""), 10.0).number
+    assert desk.decide(True, number=to_ben) == []
+    [yes] = desk.decide(True, number=to_cleo)
+    assert yes.sought.user == "cleo"
 
 
 def test_silence_is_a_no_after_some_seconds() -> None:

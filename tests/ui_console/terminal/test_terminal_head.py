@@ -64,7 +64,7 @@ def test_a_reason_that_does_not_fit_stands_below_whole() -> None:
 
 @pytest.mark.parametrize("columns", WIDTHS)
 def test_a_question_and_its_answer_are_never_cut(columns: int) -> None:
-    asked = ConsentView("ben", "scout1", "mine is stuck", 6.0, 1, "take", "ben asks for scout1: mine is stuck")
+    asked = ConsentView("ben", "scout1", "mine is stuck", 6.0, 1, "take", "ben asks for scout1: mine is stuck", 1)
     view = own(busy(), consent=asked, asked="cleo keeps scout2: nearly done")
     says = [one.plain for one in shown_at(view, columns).says]
     assert "ben asks for scout1: mine is stuck [g: yes, n: no; 6 s, 1 more]" in says

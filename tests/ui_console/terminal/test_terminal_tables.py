@@ -12,7 +12,7 @@ from written_session import WrittenSession, settle
 from backbone.component.messages import StoryEvent
 from backbone.errors import Refusal
 from backbone.mission_log.log import AskLog, Log
-from ui_console.model.consent import Consent, Settled, Sought
+from ui_console.model.consent import Consent, Settled, Sought, Topic
 from ui_console.model.events import (
     ConsentAsked,
     ConsentHeard,
@@ -162,31 +162,34 @@ async def test_a_parameter_is_changed_by_typing_another_value(is_sure: bool) -> 
 
 async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_keys_that_decide() -> None:
     shown = held_model()
-    sought = Sought("ui_console/console-2", "ben", "scout1", "my robot is stuck", 18.0)
+    sought = Sought("ui_console/console-2", "ben", "scout1", "my robot is stuck", 18.0, number=1)
     shown.apply(sought)
     session = WrittenSession(shown=shown)
     screen = ConsoleApp(session)
     async with screen.run_test(size=(160, 36)) as pilot:
         await settle(pilot)
         assert "ben asks for scout1: my robot is stuck [g: yes, n: no; 6 s]" in screen_text(screen)
+        shown.apply(Settled(sought, Consent(False, "anna", "no answer")))
+        lift = Sought("ui_console/console-3", "cleo", "scout1", "", 18.0, Topic.LIFT, number=2)
+        shown.apply(lift)
         await pilot.press("g")
-        assert session.wanted[-1] == ("decide", True)
-        shown.apply(Settled(sought, Consent(True, "anna", "")))
+        assert session.wanted[-1] == ("decide", True, 1), "the question on the screen, not the next one"
+        shown.apply(Settled(lift, Consent(False, "anna", "no answer")))
         screen.redraw()
         await settle(pilot)
-        assert "ben asks" not in screen_text(screen)
+        assert "asks" not in screen_text(screen)
 
 
 async def test_a_pendants_holder_is_asked_in_the_same_words_and_answers_by_the_same_keys() -> None:
     shown = held_model()
-    shown.apply(Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0))
+    shown.apply(Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0, number=1))
     session = WrittenSession(shown=shown)
     screen = ConsoleApp(session, profile=Profile.PENDANT)
     async with screen.run_test(size=(50, 20)) as pilot:
         await settle(pilot)
         assert "ben asks for scout1: stuck [g: yes, n: no; 6 s]" in " ".join(screen_text(screen).split())
         await pilot.press("n")
-    assert session.wanted == [("decide", False)]
+    assert session.wanted == [("decide", False, 1)]
 
 
 async def test_who_asks_may_say_why_and_sees_what_came_of_it() -> None:

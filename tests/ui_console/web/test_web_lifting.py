@@ -14,6 +14,7 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
+from ui_console.model.consent import CONSENT_WITHIN_S
 from ui_console.model.console import ConsoleModel
 from ui_console.model.views import AlarmKind, AlarmView
 from ui_console.session.observer import Observer
@@ -80,9 +81,9 @@ def test_the_person_at_the_page_who_stopped_the_robot_is_asked_and_nobody_else(s
         lifting = asyncio.create_task(on.terminal.lift_stop("scout1", on.robot.latch.state.number))
         await on.until(lambda: on.question(anna))
         assert on.question(cleo) is None
-        cleo.obey(Decide(True))
+        cleo.obey(Decide(True, on.question(anna).number))
         assert on.robot.latch.state.is_stopped
-        anna.obey(Decide(True))
+        anna.obey(Decide(True, on.question(anna).number))
         assert await lifting
         assert on.question(anna) is None
 
@@ -106,7 +107,7 @@ def test_one_page_asks_another_of_the_same_server_and_reads_the_answer(stage: Ca
         await on.hub.observer.stop_robot("scout1", "", "anna")
         cleo.obey(LiftRequest("scout1", on.robot.latch.state.number))
         await on.until(lambda: on.question(anna))
-        anna.obey(Decide(False))
+        anna.obey(Decide(False, on.question(anna).number))
         await on.until(lambda: "anna keeps scout1 stopped" in cleo.model.own(on.clock.now_s()).asked)
         assert anna.model.own(on.clock.now_s()).asked == ""
         anna.obey(LiftRequest("scout1", on.robot.latch.state.number))
@@ -124,9 +125,29 @@ def test_two_people_at_pages_of_one_server_ask_at_the_same_time(stage: Callable[
         await on.until(lambda: on.question(anna) and on.question(anna).others == 1)
         for page in (ben, cleo):
             assert on.question(anna).user == page.welcome.user
-            anna.obey(Decide(False))
+            anna.obey(Decide(False, on.question(anna).number))
             await on.until(lambda page=page: "anna keeps scout1 stopped" in page.model.own(on.clock.now_s()).asked)  # type: ignore[misc]
         assert on.question(anna) is None
+
+    stage(scene)
+
+
+def test_a_yes_that_comes_too_late_does_not_answer_the_next_question(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        anna, cleo = on.hub.enter(Welcome("anna", 100)), on.hub.enter(Welcome("cleo", 100))
+        await on.hub.observer.stop_robot("scout1", "", "anna")
+        number = on.robot.latch.state.number
+        asking = asyncio.create_task(on.terminal.lift_stop("scout1", number))
+        await on.until(lambda: on.question(anna))
+        to_ben = Decide(True, on.question(anna).number)
+        await on.clock.sleep_s(CONSENT_WITHIN_S - 1.0)
+        cleo.obey(LiftRequest("scout1", number))
+        assert not await asking, "nobody answered in time"
+        anna.obey(to_ben)
+        assert on.question(anna).user == "cleo", "still asked"
+        assert anna.outbox.next(0.0) == '{"answer":{"refused":"no answer was given: that question is over"}}'
+        await on.clock.sleep_s(1.0)
+        assert on.robot.latch.state.is_stopped
 
     stage(scene)
 

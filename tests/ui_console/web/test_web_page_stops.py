@@ -128,7 +128,7 @@ async def test_who_lifts_anothers_stop_reads_whose_it_is_and_that_one_is_asked(s
             await page.mouse.up()
             assert ben.view["own"]["consent"]["topic"] == "lift"
             assert stage.robots["scout1"].is_stopped
-            await ben.say(do="decide", is_given=is_given)
+            await ben.decide(is_given=is_given)
             if is_given:
                 await wait_free(page)
             else:
@@ -144,6 +144,24 @@ async def test_who_stopped_a_robot_reads_that_a_yes_lets_it_move(stage: Stage) -
         await asked.get_by_role("button", name="Keep it stopped").wait_for()
         await asked.get_by_role("button", name="Let it move").click()
         await wait_free(page)
+
+
+async def test_a_yes_pressed_twice_answers_one_question_and_not_the_next(stage: Stage) -> None:
+    async with page_at(stage) as page, stage.browser(LOW) as ben, stage.browser() as anna:
+        for robot, asks in (("scout1", ben), ("scout2", anna)):
+            await stop_button(page, robot).click()
+            await wait_stopped(page, robot)
+            await asks.say(do="lift", robot=robot, number=stage.robots[robot].latch.state.number)
+            await asks.wait(lambda asks=asks: "asked desktop" in asks.view["own"]["asked"], "asked")  # type: ignore[misc]
+        await page.locator("#consent-line").get_by_text("1 more ask").wait_for()
+        yes = page.locator("#consent-yes")
+        await yes.click()
+        await wait_free(page, "scout1")
+        box = await yes.bounding_box()
+        await page.mouse.click(box["x"] + 9, box["y"] + 9)
+        await asyncio.sleep(0.3)
+        assert stage.robots["scout2"].is_stopped
+        await page.locator("#consent-line").get_by_text("anna asks whether scout2").wait_for()
 
 
 @pytest.mark.parametrize("hand", rest_thorough(HANDS))

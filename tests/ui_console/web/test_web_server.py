@@ -147,13 +147,13 @@ async def test_who_waits_asks_with_one_button_and_who_holds_answers_with_one(sta
         await anna.wait(lambda: anna.view["own"]["consent"], "asked")
         shown = anna.view["own"]["consent"]
         assert (shown["user"], shown["robot"], shown["why"]) == ("Carla", "scout1", "mine is stuck")
-        await anna.say(do="decide", is_given=False)
+        await anna.decide(is_given=False)
         await carla.wait(lambda: carla.view["own"]["asked"] == "anna keeps scout1", "declined")
         assert anna.is_held
 
         await carla.say(do="may_i")
         await anna.wait(lambda: anna.view["own"]["consent"], "asked again")
-        await anna.say(do="decide", is_given=True)
+        await anna.decide(is_given=True)
         await carla.wait(lambda: carla.view["own"]["asked"] == "anna lets you have scout1", "granted")
         await anna.wait(lambda: not anna.is_held and not anna.view["own"]["consent"], "given back")
         assert held.is_idle

@@ -85,6 +85,10 @@ class Browser:
         """Say that the stick is held since now."""
         await self.say(do="drive", moment=self.view["own"]["moment"], **stick)
 
+    async def decide(self, *, is_given: bool) -> None:
+        """Answer the question on the page."""
+        await self.say(do="decide", is_given=is_given, number=self.view["own"]["consent"]["number"])
+
     async def wait(self, holds: Callable[[], Any], what: str) -> None:
         """Return when this holds of what was heard so far."""
         try:

@@ -11,6 +11,7 @@ import { lasting, set } from "./text.js";
 /** @import { Act } from "./types.d.ts" */
 
 const MEMORY = "held";
+const READ_MS = 700; // chosen: longer than a double press, shorter than it takes to read a question
 
 /** Shows `own` of the view; `act(what, name)` carries out a person's action. */
 export class Hand {
@@ -26,13 +27,16 @@ export class Hand {
     this.now_s = 0;
     this.ordered = ""; // the robot that the stick can take back from its order
     this.memory = new Memory();
+    this.question = 0; // number of the shown one; 0: none
+    /** @type {ReturnType<typeof setTimeout> | 0} */
+    this.timer = 0;
     find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
     find("release").addEventListener("click", () => act("release"));
     find("may-i").addEventListener("click", () => act("may_i"));
     find("stop-mine").addEventListener("click", () => act("stop_mine"));
     find("halt").addEventListener("click", () => act("halt"));
-    find("consent-yes").addEventListener("click", () => act("consent", "yes"));
-    find("consent-no").addEventListener("click", () => act("consent", "no"));
+    find("consent-yes").addEventListener("click", () => act("consent", "yes", { number: this.question }));
+    find("consent-no").addEventListener("click", () => act("consent", "no", { number: this.question }));
     find("retake").addEventListener("click", () => {
       this.memory.forget();
       act("take", find("retake").dataset.robot);
@@ -185,9 +189,22 @@ export class Hand {
     retake.disabled = told !== null && !told.may_retake;
   }
 
+  /** Disable the answers for a moment: a press now is meant for what was there before this question. */
+  delayAnswers() {
+    const answers = ["consent-yes", "consent-no"].map((id) => find(id, HTMLButtonElement));
+    for (const answer of answers) answer.disabled = true;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => {
+      for (const answer of answers) answer.disabled = false;
+    }, READ_MS);
+  }
+
   showConsent() {
     const consent = this.own?.consent ?? null;
     find("consent").hidden = consent === null;
+    const number = consent?.number ?? 0;
+    if (number !== this.question) this.delayAnswers();
+    this.question = number;
     if (consent === null) return;
     const others = consent.others ? `, ${consent.others} more ask` : "";
     const left = `${Math.ceil(consent.left_s)} s${others}`;

@@ -188,7 +188,7 @@ const words = {
   release: () => ({ do: "release" }),
   lift: (name, { number = 0 }) => ({ do: "lift", robot: name, number }),
   may_i: () => ({ do: "may_i" }),
-  consent: (answer) => ({ do: "decide", is_given: answer === "yes" }),
+  consent: (answer, { number = 0 }) => ({ do: "decide", is_given: answer === "yes", number }),
   dismiss: () => ({ do: "dismiss_lost" }),
   give: (word, { values = {}, role = "" }) => ({ do: "give", moment: hand.moment, word, values, role }),
   order: (kind, { robots = [], x_m = 0, y_m = 0, target = "" }) => ({

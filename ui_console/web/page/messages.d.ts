@@ -106,6 +106,7 @@ export interface ConsentView {
   others: number;
   topic: string;
   line: string;
+  number: number;
 }
 
 export interface FieldForm {
@@ -568,6 +569,7 @@ export interface BeatRequest {
 export interface Decide {
   do: "decide";
   is_given: boolean;
+  number: number;
 }
 
 export interface DismissLost {
