@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 from collections import deque
 from collections.abc import Iterable, Sequence
-from itertools import islice
+from itertools import accumulate, islice, takewhile
 from typing import Annotated
 
 import msgspec
@@ -24,10 +24,11 @@ from backbone.mission_log.people import People
 from backbone.naming import Subsystem
 from backbone.printable import printable_all
 from backbone.ranges import MANY, Count, Instant, Line, Mention
-from backbone.wire import Envelope, Message
+from backbone.wire import MAX_MESSAGE_BYTES, Envelope, Message
 
 EVENTS_KEPT = 20_000  # chosen: hours of a busy mission, some megabytes
-MOST_EVENTS = 10_000  # chosen: fits one message with room to spare
+MOST_EVENTS = 10_000  # chosen: two megabytes of usual events
+MOST_EVENTS_BYTES = MAX_MESSAGE_BYTES // 2  # chosen: fits one message with room to spare, however long the texts are
 FOR_EVER_S = 1e12  # the latest ``Instant``
 _ORDER = list(LogLevel)
 
@@ -42,7 +43,7 @@ class AskLog(Message, frozen=True):
         person: Only actions of this person, and events that mention the person.
         level: Only events of at least this level.
         text: Only events that contain this text, in upper or lower case.
-        most: Largest number of events; the newest are kept.
+        most: Largest number of events; the newest are kept, as many as fit one message.
     """
 
     since_s: Instant = 0.0
@@ -147,7 +148,8 @@ class MissionLog:
     def answer(self, asked: AskLog) -> Log:
         """Return the events that match, with the names of people."""
         found = chosen(map(self.people.named_event, filter(asked.reaches, self._events)), asked)
-        return Log(found[-asked.most :], max(0, len(found) - asked.most), self._since_s)
+        kept = _newest_of_one_message(found[-asked.most :])
+        return Log(kept, len(found) - len(kept), self._since_s)
 
     def copied(self) -> MissionLog:
         """Return an independent copy; both share the events, which never change."""
@@ -160,6 +162,13 @@ class MissionLog:
         known = {(event.at_s, event.where) for event in events}
         own = [event for event in self._events if (event.at_s, event.where) not in known]
         self._events = deque(sorted([*events, *own], key=lambda event: event.at_s), maxlen=self._events.maxlen)
+
+
+def _newest_of_one_message(events: Sequence[StoryEvent]) -> list[StoryEvent]:
+    """Return the newest events that fit one message, oldest first."""
+    sizes = accumulate(len(msgspec.msgpack.encode(event)) for event in reversed(events))
+    count = sum(1 for _ in takewhile(lambda size: size <= MOST_EVENTS_BYTES, sizes))
+    return list(events[len(events) - count :])
 
 
 def chosen(events: Iterable[StoryEvent], asked: AskLog) -> list[StoryEvent]:

@@ -18,6 +18,7 @@ from backbone.mission_log.lines import log_json, log_lines
 from backbone.mission_log.log import AskLog, Log, LogKeeper, MissionLog
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.moments import Now
+from backbone.wire import MAX_MESSAGE_BYTES, WIRE_VERSION, Envelope, write
 
 CONSOLE = "ui_console/console-7"
 NOW = Now(100.0, datetime(2026, 5, 4, 14, 10))
@@ -77,6 +78,17 @@ def test_the_newest_that_fit_are_told_oldest_first(events: list[tuple[float, Log
     fitting = sorted(at_s for at_s, level in events if level is not LogLevel.INFO)
     assert [one.at_s for one in found.events] == fitting[-most:]
     assert found.left_out == max(0, len(fitting) - most)
+
+
+def test_an_answer_fits_one_message_however_long_the_texts_are() -> None:
+    log, count = MissionLog(), 2_000
+    for at_s in range(count):
+        log.add(event(at_s, "talker", "ö" * 5_000))
+    found = log.answer(AskLog())
+    assert len(write(Envelope(WIRE_VERSION, "backbone/launcher", 1, 0.0, "", found))) < MAX_MESSAGE_BYTES
+    assert len(found.events) + found.left_out == count
+    assert len(found.events) > 100
+    assert [one.at_s for one in found.events] == [float(at_s) for at_s in range(found.left_out, count)]
 
 
 def test_the_keeper_hears_components_and_people_and_calls_people_by_their_names() -> None:
