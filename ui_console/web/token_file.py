@@ -75,7 +75,7 @@ class TokenFile:
                 return {}
             try:
                 return msgspec.json.decode(file.read(), type=dict[str, TokenRights])
-            except msgspec.DecodeError:
+            except (msgspec.DecodeError, UnicodeDecodeError):
                 return {}
 
     def keep(self, rights: Mapping[str, TokenRights]) -> None:

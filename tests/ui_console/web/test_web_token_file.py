@@ -68,7 +68,7 @@ def test_tokens_that_somebody_else_could_read_open_nothing(tmp_path: Path) -> No
     assert file.read() == {}
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b'{"a": 1}', b"[]"])
+@pytest.mark.parametrize("content", [b"", b"{", b'{"a": 1}', b"[]", b'{"\xff": {"user": "anna", "priority": 1}}'])
 def test_what_is_no_token_file_opens_nothing(tmp_path: Path, content: bytes) -> None:
     file = TokenFile(tmp_path, 8420)
     file.keep({})
