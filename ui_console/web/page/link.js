@@ -11,6 +11,7 @@ const BEAT_EVERY_MS = 250; // chosen: resolution of the content's age
 const LOOK_EVERY_MS = 100;
 const OLD_MS = 800; // chosen: with the checks in between, the warning appears before the content is a second old
 const SILENT_MS = 2000; // chosen: eight beats without return; browsers do not report the loss of a network
+const ANSWER_MS = 10000; // chosen: as long as the server waits for a request and a token
 const NOT_LET_IN = 1008;
 
 /**
@@ -76,6 +77,7 @@ export class Link {
     const socket = new WebSocket(at);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
+    this.timer = setTimeout(() => this.giveUp("the server does not answer"), ANSWER_MS);
     socket.onopen = () => socket.send(JSON.stringify({ do: "hello", page: this.page, ...this.hello }));
     socket.onmessage = (event) => {
       if (socket !== this.socket) return;
@@ -93,12 +95,14 @@ export class Link {
     socket.onclose = (event) => {
       if (socket !== this.socket) return;
       this.socket = null;
+      clearTimeout(this.timer);
       if (event.code === NOT_LET_IN && !this.isUp) this.become("refused", event.reason);
       else this.again(event.reason || "no connection to the server");
     };
   }
 
   came() {
+    clearTimeout(this.timer);
     this.waitMs = AGAIN_FIRST_MS;
     this.freshness.begin(this.now());
     this.seenSince = this.now();
@@ -115,17 +119,22 @@ export class Link {
     const now = this.now();
     this.freshness.ran(now);
     if (!this.isUp || document.hidden) return;
-    if (Math.min(this.freshness.silence(now), now - this.seenSince) > this.silentMs) this.giveUp();
+    if (Math.min(this.freshness.silence(now), now - this.seenSince) > this.silentMs)
+      this.giveUp("the server is silent");
     else if (this.freshness.age(now) > this.oldMs) this.become("old", "the server is silent");
     else this.become("fresh", "");
   }
 
-  /** End the connection, because its further messages would be too old. */
-  giveUp() {
+  /**
+   * End the connection, because its further messages would be too old, or because it does not come about.
+   *
+   * @param {string} why
+   */
+  giveUp(why) {
     const silent = this.socket;
     this.socket = null;
     silent?.close();
-    this.again("the server is silent");
+    this.again(why);
   }
 
   /** @param {string} why */
