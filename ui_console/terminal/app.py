@@ -179,13 +179,13 @@ class ConsoleApp(ConsoleDisplay):
             return
         self._session.touch()
         self._session.stop()
-        self._begin(partial(self._stop_robot, robot))
+        self._begin(self._carried_out(self._stop_robot(robot)))
 
     def action_stop_all(self) -> None:
         """Stop all robots, regardless of their holders."""
         self._session.touch()
         self._session.stop()
-        self._begin(self._stop_all)
+        self._begin(self._carried_out(self._stop_all()))
 
     def action_lift(self) -> None:
         """Show the stop with its authors and reason, and lift it if a different key confirms."""

@@ -5,7 +5,9 @@ Widgets contain no logic: ``ConsoleModel`` has their content, ``keys`` has the k
 
 from __future__ import annotations
 
-from typing import ClassVar
+import asyncio
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any, ClassVar
 
 import msgspec
 from rich.text import Text
@@ -107,6 +109,7 @@ class ConsoleDisplay(EndingApp):
         self._turn = PanelName.SCHEDULE
         self._found: LogResult | None = None
         self._view: ConsoleView | None = None
+        self._stops: set[asyncio.Task[None]] = set()
 
     @property
     def drives(self) -> bool:
@@ -146,9 +149,18 @@ class ConsoleDisplay(EndingApp):
         """Adapt the layout to the new size."""
         self.call_after_refresh(self.redraw)
 
-    def on_unmount(self, _event: Unmount) -> None:
-        """Notify the session first that the screen ended."""
+    async def on_unmount(self, _event: Unmount) -> None:
+        """Notify the session that the screen ended, as soon as no emergency stop is under way."""
+        if self._stops:
+            await asyncio.wait(self._stops)
         self._session.closed()
+
+    def _carried_out(self, stop: Coroutine[Any, Any, None]) -> Callable[[], Awaitable[None]]:
+        """Begin an emergency stop that the end of the screen does not cancel; the result waits for it."""
+        task = asyncio.create_task(stop, name="emergency stop")
+        self._stops.add(task)
+        task.add_done_callback(self._stops.discard)
+        return lambda: asyncio.shield(task)
 
     def redraw(self) -> None:
         """Show the model's present content."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import msgspec
 import pytest
 from bursts import burst
@@ -226,6 +228,34 @@ async def test_a_stop_in_the_picker_is_for_the_robot_that_the_console_asks_for_u
         await pilot.press("x")
         await settle(pilot)
     assert session.wanted == ["stop", ("stop robot", meant)]
+
+
+class SlowSession(WrittenSession):
+    """Its stops take a moment, and are not confirmed; writes down its end, too."""
+
+    async def stop_robot(self, robot: str) -> bool:
+        await asyncio.sleep(0.05)
+        await super().stop_robot(robot)
+        return False
+
+    async def stop_all(self) -> list[str]:
+        await asyncio.sleep(0.05)
+        return [*await super().stop_all(), "scout2"]
+
+    def closed(self) -> None:
+        self.wanted.append("closed")
+
+
+@pytest.mark.parametrize("leave", ["q", "ctrl+c"])
+@pytest.mark.parametrize(("key", "stop"), [("x", ("stop robot", "scout1")), ("X", "stop all")])
+async def test_a_stop_is_carried_out_before_a_console_that_is_left_at_once_ends(
+    key: str, stop: object, leave: str
+) -> None:
+    session = SlowSession(shown=held_model())
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await settle(pilot)
+        burst(pilot, key, leave)
+    assert session.wanted == ["stop", stop, "closed"]
 
 
 def test_a_stop_is_for_the_robot_in_hand_then_for_the_row_then_for_the_one_wanted() -> None:
