@@ -23,9 +23,6 @@ _MOTION = [
 ]
 _HUGE = 1e10  # MuJoCo, mjMAXVAL
 
-# Otherwise MuJoCo writes a file MUJOCO_LOG.TXT into the present folder.
-mujoco.set_mju_user_warning(lambda text: log.warning("MuJoCo: %s", text))
-
 
 class Stability:
     """The warnings of one world.
@@ -39,6 +36,7 @@ class Stability:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, kinds: Mapping[str, str]) -> None:
         self._model, self._kinds = model, kinds
         self._counts, self._places = data.warning.number, data.warning.lastinfo
+        mujoco.set_mju_user_warning(_log)  # otherwise MuJoCo writes a file MUJOCO_LOG.TXT into the present folder
 
     def check(self) -> None:
         """Check that MuJoCo has computed all steps until now.
@@ -62,3 +60,7 @@ class Stability:
         """Return the robot with its class path, and its part, of a MuJoCo name."""
         robot, _, part = name.partition("/")
         return (f"{robot} ({self._kinds[robot]})", part) if robot in self._kinds else ("the room", name)
+
+
+def _log(text: str) -> None:
+    log.warning("MuJoCo: %s", text)

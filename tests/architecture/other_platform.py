@@ -64,7 +64,9 @@ def refuse_modules() -> None:
 
     def importing(name: str, given: Any = None, *others: Any, **named: Any) -> ModuleType:
         importer = str((given or {}).get("__name__", ""))
-        if name.partition(".")[0] in IMPORTS and importer.partition(".")[0] in PACKAGES:
+        is_of_a_library = isinstance((*others, None, None)[1], list)  # its native code imports, with our globals
+        is_own = importer.partition(".")[0] in PACKAGES and not is_of_a_library
+        if is_own and name.partition(".")[0] in IMPORTS:
             raise ImportError(f"{importer}: {name} is not on this platform")
         return real(name, given, *others, **named)
 
