@@ -12,12 +12,15 @@ from typing import Protocol
 
 from backbone.component.messages import LogLevel
 from backbone.component.story import StoryBook
+from backbone.errors import LinkError, Refusal, complaint
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.holds import Hold, HoldTable
 
 log = logging.getLogger(__name__)
 
 SAFE_WITHIN_S = 0.4  # chosen: below the RC manager's limit, so that the RC manager gets the reason; machine seconds
+FAULTS = (Refusal, LinkError, TimeoutError)
+"""Of a hook of a hold: the hardware, or a component that the hook asked, does not obey. All others are bugs."""
 
 
 class RcOfHolds(Protocol):
@@ -56,6 +59,10 @@ class HoldEnds:
         self._unsafe: dict[str, Hold] = {}
         self._remark = ""
 
+    def left(self) -> list[Hold]:
+        """Return the ended holds after which the resource is still unsafe."""
+        return list(self._unsafe.values())
+
     def unsafe(self, arc: str) -> Hold | None:
         """Return the ended hold of this ARC if the resource is still unsafe after it."""
         return self._unsafe.get(arc)
@@ -65,29 +72,41 @@ class HoldEnds:
 
         Raises:
             HardwareFault: The resource is not safe; the RC retries before the next connection.
+            Exception: A bug in ``make_safe``, which ends the RC; the resource is not safe.
         """
         rc = self._rc
         self._unsafe[hold.arc] = hold
         try:
             async with asyncio.timeout(SAFE_WITHIN_S):
                 await rc.make_safe(hold)
-        except (HardwareFault, TimeoutError) as error:
-            detail = error.detail if isinstance(error, HardwareFault) else f"nothing within {SAFE_WITHIN_S} s"
+        except Exception as error:
+            detail = detail_of(error)
             self.faults += 1
             rc.publish_event(hold.arc, f"disconnected ({reason}), but {rc.name} is not safe: {detail}", LogLevel.ALARM)
             self.report_holders()
+            if not isinstance(error, FAULTS):
+                raise
             raise HardwareFault(f"{rc.name} is not safe after {hold.arc}: {detail}", arc=hold.arc) from error
         del self._unsafe[hold.arc]
         rc.story.note(hold.arc, f"disconnected: {reason}")
         self.report_holders()
 
     async def end_all(self, ended: Sequence[Hold], reason: str) -> None:
-        """End these holds; if the hardware fails at one of them, the others are still ended and nothing is raised."""
+        """End these holds, each of them even if another one fails.
+
+        Raises:
+            Exception: The first bug in ``make_safe``. If the hardware fails, nothing is raised.
+        """
+        bugs: list[Exception] = []
         for hold in ended:
             try:
                 await self.end(hold, reason)
             except HardwareFault as fault:
                 log.warning("%s", fault)
+            except Exception as bug:
+                bugs.append(bug)
+        if bugs:
+            raise bugs[0]
 
     async def make_up(self) -> None:
         """Retry the safe state for every hold for which it failed.
@@ -95,7 +114,7 @@ class HoldEnds:
         Raises:
             HardwareFault: The resource is still not safe.
         """
-        for hold in list(self._unsafe.values()):
+        for hold in self.left():
             await self.end(hold, "made up for")
 
     def remark(self, line: str) -> None:
@@ -111,3 +130,16 @@ class HoldEnds:
         remark = f"; {self._remark}" if self._remark else ""
         self._rc.report(f"held by {holders}{unsafe}{remark}" if holders else f"free{unsafe}{remark}")
         self._rc.changed()  # the same ARC may hold the RC with a new epoch
+
+
+def detail_of(error: Exception) -> str:
+    """Return why a hook of a hold failed, as part of a sentence."""
+    match error:
+        case Refusal():
+            return error.detail
+        case TimeoutError():
+            return f"nothing within {SAFE_WITHIN_S} s"
+        case LinkError():
+            return str(error)
+        case _:
+            return complaint(error)

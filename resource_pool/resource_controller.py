@@ -21,7 +21,6 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.abilities import Abilities, CameraForm, command_form, field_forms
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.errors import Refusal
 from backbone.exchange import SwapClass
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -46,11 +45,12 @@ from resource_pool.driver_slot import DriverSlot
 from resource_pool.drivers.interface import (
     AdjustableDriver,
     DriverSite,
+    HardwareFault,
     NoOptions,
     build_driver,
     options_of_drivers,
 )
-from resource_pool.hold_ends import SAFE_WITHIN_S, HoldEnds
+from resource_pool.hold_ends import FAULTS, SAFE_WITHIN_S, HoldEnds, detail_of
 from resource_pool.holds import Hold, HoldTable
 from resource_pool.messages import Applied, ImpossibleUse, NeedsRestart, NotFromYou
 from resource_pool.rc_parameters import RcParameters, sort_out_options
@@ -132,7 +132,11 @@ class ResourceController(Component[R], Generic[R]):
 
     # ------------------------------------------------------------------ hooks
     async def connected(self, hold: Hold) -> None:
-        """Prepare to serve this hold. When: after it is in the table, before any command. Not: wait for the ARC."""
+        """Prepare to serve this hold.
+
+        When: after it is in the table, before any command. What: switch on, start streams. If it fails, or exceeds
+        ``SAFE_WITHIN_S`` and is cancelled, ``make_safe`` is called and the ARC is refused. Not: wait for the ARC.
+        """
 
     async def make_safe(self, hold: Hold) -> None:
         """Bring the resource of this hold into its safe state.
@@ -261,7 +265,8 @@ class ResourceController(Component[R], Generic[R]):
         """End all holds; bring the resource into its safe state if the hardware obeys."""
         async with self._changing:
             ended = [self.holds.disconnect(hold.arc, hold.epoch) for hold in self.holds.holds()]
-            await self._ends.end_all([hold for hold in ended if hold is not None], "the RC ends")
+            still = [*self._ends.left(), *(hold for hold in ended if hold is not None)]
+            await self._ends.end_all(still, "the RC ends")
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the RC manager and carry out commands."""
@@ -366,10 +371,14 @@ class ResourceController(Component[R], Generic[R]):
             await self._ends.make_up()
             self.holds.connect(hold)
             try:
-                await self.connected(hold)
-            except Refusal:
+                async with asyncio.timeout(SAFE_WITHIN_S):  # other holds, and the RC's end, wait for this one
+                    await self.connected(hold)
+            except FAULTS as error:
                 self.holds.disconnect(hold.arc, hold.epoch)
-                raise
+                await self._ends.end_all([hold], f"could not be connected: {detail_of(error)}")
+                if not isinstance(error, TimeoutError):
+                    raise
+                raise HardwareFault(f"{self.name} could not be connected to {hold.arc}: {detail_of(error)}") from error
             self._connects += 1
             self._lease_changed.set()
             self.story.note(order.arc, f"connected under epoch {order.epoch}")

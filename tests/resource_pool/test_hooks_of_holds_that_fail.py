@@ -1,0 +1,156 @@
+"""A hook of a hold that hangs or fails leaves its resource safe, and holds up no other hold of the RC."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+from pool_on_local_network import Pool, a_pool
+
+from backbone.bus.clock import run_virtual
+from backbone.bus.interface import Reply
+from backbone.component.messages import LogLevel
+from backbone.errors import NoResponder, OutcomeUnknown, Refusal, ReplyTimeout
+from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, StaleEpoch
+from backbone.scheduling.requests import RcUse
+from backbone.wire import Message
+from resource_pool.drivers.interface import HardwareFault
+from resource_pool.holds import Hold
+from resource_pool.resource_controller import RcParameters, ResourceController
+
+LEASE_S = 2.0
+
+
+class Shared(ResourceController[RcParameters]):
+    """A sharable RC whose hooks fail for the ARCs that the test names."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self.connecting: dict[str, Exception | None] = {}
+        self.ending: dict[str, Exception] = {}
+        self.diary: list[str] = []
+
+    async def connected(self, hold: Hold) -> None:
+        self.diary.append(f"on for {hold.arc}")
+        if hold.arc in self.connecting:
+            if (error := self.connecting[hold.arc]) is not None:
+                raise error
+            await asyncio.Event().wait()
+
+    async def make_safe(self, hold: Hold) -> None:
+        self.diary.append(f"off for {hold.arc}")
+        if hold.arc in self.ending:
+            raise self.ending[hold.arc]
+
+
+async def _shared(pool: Pool) -> Shared:
+    return await pool.start(Shared, "lights", {"sharable": True})
+
+
+async def _order(pool: Pool, order: Message, reply: type[Reply]) -> Reply:
+    return await pool.manager_voice.ask("resource_pool/lights", order, reply, within_s=0.5)
+
+
+async def _connect(pool: Pool, *arcs: str) -> None:
+    for epoch, arc in enumerate(arcs, start=1):
+        await _order(pool, Connect(arc, epoch, LEASE_S, RcUse(), {}), Connected)
+
+
+@pytest.mark.parametrize(
+    ("error", "refusal", "detail"),
+    [
+        (None, HardwareFault, "lights could not be connected to two: nothing within 0.4 s"),
+        (HardwareFault("lamp 2 is dark"), HardwareFault, "lamp 2 is dark"),
+        (ReplyTimeout("no dimmer"), OutcomeUnknown, "no dimmer"),
+    ],
+    ids=["hangs", "fault", "link"],
+)
+def test_a_connection_that_fails_is_made_safe_and_holds_up_no_other_hold(
+    local_mission: Any, error: Exception | None, refusal: type[Refusal], detail: str
+) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            rc = await _shared(pool)
+            rc.connecting["two"] = error
+            with pytest.raises(refusal, match=detail):
+                await _connect(pool, "one", "two")
+            assert rc.diary == ["on for one", "on for two", "off for two"]
+            assert rc.feedback == "held by one"
+            assert "could not be connected" in rc.story.of("two")[-1].what
+            await pool.clock.sleep_s(LEASE_S)
+            assert rc.diary[-1] == "off for one", "its lease has ended"
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("error", [ReplyTimeout("no dimmer"), StaleEpoch("no dimmer for epoch 1")], ids=repr)
+def test_a_safe_state_that_another_component_refused_is_an_alarm_and_tried_again(
+    local_mission: Any, error: Exception
+) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            rc = await _shared(pool)
+            rc.ending["one"] = error
+            await _connect(pool, "one", "two")
+            with pytest.raises(HardwareFault, match="lights is not safe after one"):
+                await _order(pool, Disconnect("one", 1), Disconnected)
+            assert rc.feedback == "held by two, not safe after one"
+            assert rc.story.of("one")[-1].level is LogLevel.ALARM
+            del rc.ending["one"]
+            await _order(pool, Connect("three", 3, LEASE_S, RcUse(), {}), Connected)
+            assert rc.feedback == "held by three, two"
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("error", [ReplyTimeout("no dimmer"), ValueError("no lamp 1")], ids=repr)
+@pytest.mark.parametrize("is_ended", [True, False])
+def test_all_other_holds_are_made_safe_when_one_is_not(local_mission: Any, error: Exception, is_ended: bool) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            rc = await _shared(pool)
+            rc.ending["one"] = error
+            await _connect(pool, "one", "two", "three")
+            if is_ended:
+                rc.end("enough")
+            await pool.clock.sleep_s(LEASE_S + 0.1)
+            assert {"off for two", "off for three"} <= {*rc.diary}
+            alarms = [event for event in rc.story.of("one") if event.level is LogLevel.ALARM]
+            assert alarms
+            assert str(error) in alarms[0].what
+            if is_ended or isinstance(error, ValueError):
+                assert await pool.outcome("lights") is (error if isinstance(error, ValueError) else None)
+            else:
+                assert rc.feedback == "free, not safe after one"
+
+    run_virtual(main())
+
+
+def test_what_is_not_safe_is_tried_again_when_the_rc_ends(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            rc = await _shared(pool)
+            rc.ending["one"] = HardwareFault("lamp 1 glows")
+            await _connect(pool, "one")
+            with pytest.raises(HardwareFault):
+                await _order(pool, Disconnect("one", 1), Disconnected)
+            del rc.ending["one"]
+            rc.end("enough")
+            assert await pool.outcome("lights") is None
+            assert rc.diary == ["on for one", "off for one", "off for one"]
+
+    run_virtual(main())
+
+
+def test_a_bug_in_a_connection_ends_the_rc_in_its_safe_state(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            rc = await _shared(pool)
+            rc.connecting["two"] = KeyError("lamp 2")
+            with pytest.raises(NoResponder):
+                await _connect(pool, "one", "two")
+            assert isinstance(await pool.outcome("lights"), KeyError)
+            assert sorted(rc.diary[2:]) == ["off for one", "off for two"]
+
+    run_virtual(main())
