@@ -10,7 +10,11 @@ from concurrent.futures import Executor, Future
 from functools import partial
 from typing import Any, TypeVar
 
+from backbone.errors import complaint
+
 T = TypeVar("T")
+PASSING = (asyncio.CancelledError, KeyboardInterrupt, GeneratorExit)
+"""What a caller raises into a coroutine, so no bug; a ``CancelledError`` only if a caller cancelled."""
 
 
 async def set_within(event: asyncio.Event, within_s: float | None) -> bool:
@@ -60,6 +64,39 @@ def bug_of(task: asyncio.Task[Any]) -> BaseException | None:
         if task.cancelling()
         else RuntimeError(f"{task.get_name()} raised CancelledError, and no caller cancelled it")
     )
+
+
+async def only_bugs(work: Awaitable[T], name: str = "") -> T:
+    """Return the result of the work, or raise what it raises as an ``Exception``; only what is ``PASSING`` passes.
+
+    Nobody handles the others: a ``SystemExit`` would end the event loop, for all components of the process, and an
+    exception of a library in another language would end the component without a drain.
+
+    Args:
+        work: The work of a class that is not ours.
+        name: Its name for people; empty: the name of the task.
+    """
+    try:
+        return await work
+    except asyncio.CancelledError as cut:
+        task = asyncio.current_task()
+        if task is None or task.cancelling():
+            raise
+        raise RuntimeError(f"{name or task.get_name()} raised CancelledError, and no caller cancelled it") from cut
+    except PASSING:
+        raise
+    except BaseException as error:
+        raise as_bug(error) from error
+
+
+def as_bug(error: BaseException) -> Exception:
+    """Return the exception, which a caller of ``Exception`` can handle.
+
+    Example:
+        >>> as_bug(KeyError("no")), as_bug(SystemExit(3))
+        (KeyError('no'), RuntimeError('SystemExit: 3'))
+    """
+    return error if isinstance(error, Exception) else RuntimeError(complaint(error))
 
 
 def settle(future: asyncio.Future[Any], outcome: object) -> None:

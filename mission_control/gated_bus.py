@@ -28,27 +28,23 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.component.messages import Register, Registered
-from backbone.errors import Refusal, complaint
+from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.quality import Quality
+from backbone.waiting import as_bug
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from resource_pool.arc_client import SwappedOut
 
 T = TypeVar("T")
 EXITS = (SystemExit, KeyboardInterrupt)
-"""Of a class that has replaced another one they are a bug; the process does not end at once."""
+"""Of a class that has replaced another one they are a bug; a ``KeyboardInterrupt`` of the first one is none."""
 READS = ("Ask", "List")
 POOL = f"{Subsystem.RESOURCE_POOL}/"
 
 
 async def _unready(asked: Envelope[Message]) -> Message:
     raise UnknownMessage(f"{type(asked.body).__name__} comes before its start is over")
-
-
-def as_bug(left: BaseException) -> RuntimeError:
-    """Return an exit as an exception that ends only the implementation."""
-    return RuntimeError(complaint(left))
 
 
 async def without_exit(work: Awaitable[T]) -> T:
@@ -246,10 +242,10 @@ class GatedBus:
         def heard(*what: object) -> None:
             try:
                 listener(*what)
-            except Exception as bug:
-                self.on_bug(bug)
-            except EXITS as left:
-                if self.is_first:
+            except asyncio.CancelledError:
+                raise
+            except BaseException as left:
+                if self.is_first and isinstance(left, KeyboardInterrupt):
                     raise
                 self.on_bug(as_bug(left))
 

@@ -13,6 +13,7 @@ from typing import Protocol
 from backbone.component.messages import LogLevel
 from backbone.component.story import StoryBook
 from backbone.errors import LinkError, Refusal, complaint
+from backbone.waiting import only_bugs
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.holds import Hold, HoldTable
 
@@ -78,7 +79,7 @@ class HoldEnds:
         self._unsafe[hold.arc] = hold
         try:
             async with asyncio.timeout(SAFE_WITHIN_S):
-                await rc.make_safe(hold)
+                await only_bugs(rc.make_safe(hold), f"make_safe of {rc.name}")
         except Exception as error:
             detail = detail_of(error)
             self.faults += 1

@@ -38,6 +38,7 @@ from backbone.rc_manager.messages import (
     most_epoch,
 )
 from backbone.scheduling.requests import Holder
+from backbone.waiting import only_bugs
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of
 from resource_pool.commands import OF_THE_BASE, Command
 from resource_pool.driver_exchange import DriverExchanges
@@ -372,7 +373,7 @@ class ResourceController(Component[R], Generic[R]):
             self.holds.connect(hold)
             try:
                 async with asyncio.timeout(SAFE_WITHIN_S):  # other holds, and the RC's end, wait for this one
-                    await self.connected(hold)
+                    await only_bugs(self.connected(hold), f"connected of {self.name}")
             except FAULTS as error:
                 self.holds.disconnect(hold.arc, hold.epoch)
                 await self._ends.end_all([hold], f"could not be connected: {detail_of(error)}")

@@ -13,7 +13,7 @@ from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
 from backbone.keys import Conversation
 from backbone.quality import QUALITY, Quality
 from backbone.ranges import MOST_FEW, MOST_QUOTED_BYTES
-from backbone.waiting import settle
+from backbone.waiting import PASSING, as_bug, settle
 from backbone.wire import WIRE_VERSION, Envelope, Message, OversizedMessage, Refused, UnwritableMessage, write
 
 log = logging.getLogger(__name__)
@@ -80,10 +80,12 @@ class BusBase(ABC):
         token = current_cause.set(cause)
         try:
             act(*arguments)
-        except Exception as bug:
-            self.on_bug(bug)
         except asyncio.CancelledError:  # as of the result of a cancelled task; nobody can cancel a callback
             self.on_bug(RuntimeError(f"a callback of {self.source} raised CancelledError"))
+        except PASSING:
+            raise
+        except BaseException as bug:
+            self.on_bug(as_bug(bug))
         finally:
             current_cause.reset(token)
 
@@ -106,8 +108,10 @@ class BusBase(ABC):
         except Refusal as refusal:
             self.refused += 1
             body = Refused.of(refusal)
-        except Exception as bug:
-            self.on_bug(bug)
+        except PASSING:
+            raise
+        except BaseException as bug:
+            self.on_bug(as_bug(bug))
             return None
         return self.envelope(body)
 

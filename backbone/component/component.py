@@ -39,7 +39,7 @@ from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
 from backbone.printable_text import printable
-from backbone.waiting import bug_of, first_of
+from backbone.waiting import bug_of, first_of, only_bugs
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
@@ -230,7 +230,8 @@ class Component(Generic[P_co]):
         if self._group is None and not self._end.is_set():
             work.close()
             raise RuntimeError(f"{self.address} starts {name} before it connects")
-        task = (self._group or asyncio.get_running_loop()).create_task(work, name=f"{self.name}:{name}")
+        task = (self._group or asyncio.get_running_loop()).create_task(only_bugs(work), name=f"{self.name}:{name}")
+        task.add_done_callback(lambda _ended: work.close())  # it may be cancelled before it begins
         if self._group is None:
             task.cancel()
         else:
@@ -330,7 +331,7 @@ class Component(Generic[P_co]):
                 try:
                     connected = await self._unless_ended(self.connect(), "connect")
                     if connected:
-                        await self._serve_until_end()
+                        await only_bugs(self._serve_until_end(), self.name)
                 finally:
                     self._end.set()  # also if it is killed, so that later messages start no work
                     self._group = None
@@ -343,7 +344,7 @@ class Component(Generic[P_co]):
         if connected:
             if self._state is LifeState.READY:
                 self._enter(LifeState.DRAINING)
-            await self.drain()
+            await only_bugs(self.drain(), f"{self.name}:drain")
 
     async def _serve_until_end(self) -> None:
         accepted = CommonQuestion if self.accepts is None else CommonQuestion | self.accepts
@@ -366,7 +367,8 @@ class Component(Generic[P_co]):
         if self._end.is_set():
             work.close()
             return False
-        working = asyncio.create_task(work, name=f"{self.name}:{name}")
+        working = asyncio.create_task(only_bugs(work), name=f"{self.name}:{name}")
+        working.add_done_callback(lambda _ended: work.close())
         await first_of(working, self._end.wait())
         return not working.cancelled() and working.result() is None
 

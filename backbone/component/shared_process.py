@@ -39,7 +39,7 @@ from backbone.component.membership import (
     process_address,
 )
 from backbone.component.process import exit_code_of, run_to_end, run_with_heartbeat
-from backbone.waiting import end_tasks
+from backbone.waiting import end_tasks, only_bugs
 from backbone.wire import Envelope, Message, UnknownMessage
 
 
@@ -163,7 +163,7 @@ class SharedProcess:
     async def _live(self, member: _Member, life: int) -> None:
         exit_code = 0
         try:
-            await self._live_as(member)
+            await only_bugs(self._live_as(member), member.launch.address)
         except Exception as error:  # as at the end of a process of its own
             exit_code = exit_code_of(error, member.launch.address)
         del self._lives[life]

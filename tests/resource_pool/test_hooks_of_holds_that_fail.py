@@ -27,8 +27,8 @@ class Shared(ResourceController[RcParameters]):
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
-        self.connecting: dict[str, Exception | None] = {}
-        self.ending: dict[str, Exception] = {}
+        self.connecting: dict[str, BaseException | None] = {}
+        self.ending: dict[str, BaseException] = {}
         self.diary: list[str] = []
 
     async def connected(self, hold: Hold) -> None:
@@ -127,6 +127,24 @@ def test_all_other_holds_are_made_safe_when_one_is_not(local_mission: Any, error
     run_virtual(main())
 
 
+@pytest.mark.parametrize("error", [asyncio.CancelledError(), SystemExit(2)], ids=repr)
+def test_a_safe_state_that_is_cut_off_ends_the_rc_and_leaves_no_other_hold(
+    local_mission: Any, error: BaseException
+) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            rc = await _shared(pool)
+            rc.ending["one"] = error
+            await _connect(pool, "one", "two", "three")
+            with pytest.raises(NoResponder):
+                await _order(pool, Disconnect("one", 1), Disconnected)
+            assert isinstance(await pool.outcome("lights"), RuntimeError)
+            assert rc.diary[-2:] == ["off for three", "off for two"]
+            assert any(event.level is LogLevel.ALARM for event in rc.story.of("one"))
+
+    run_virtual(main())
+
+
 def test_what_is_not_safe_is_tried_again_when_the_rc_ends(local_mission: Any) -> None:
     async def main() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
@@ -143,14 +161,15 @@ def test_what_is_not_safe_is_tried_again_when_the_rc_ends(local_mission: Any) ->
     run_virtual(main())
 
 
-def test_a_bug_in_a_connection_ends_the_rc_in_its_safe_state(local_mission: Any) -> None:
+@pytest.mark.parametrize("error", [KeyError("lamp 2"), asyncio.CancelledError(), SystemExit(2)], ids=repr)
+def test_a_bug_in_a_connection_ends_the_rc_in_its_safe_state(local_mission: Any, error: BaseException) -> None:
     async def main() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
             rc = await _shared(pool)
-            rc.connecting["two"] = KeyError("lamp 2")
+            rc.connecting["two"] = error
             with pytest.raises(NoResponder):
                 await _connect(pool, "one", "two")
-            assert isinstance(await pool.outcome("lights"), KeyError)
+            assert isinstance(await pool.outcome("lights"), KeyError | RuntimeError)
             assert sorted(rc.diary[2:]) == ["off for one", "off for two"]
 
     run_virtual(main())

@@ -52,22 +52,22 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Walker(Component[Gait]):
-    """Notes every hook in ``diary`` and fails in the hooks that the test names."""
+    """Notes every hook in ``diary`` and fails in the hooks that the test names, with ``KeyError`` or ``by``."""
 
     parameters_type = Gait
     accepts = Poke
     registers = False
 
-    def __init__(self, *args: Any, stumble: str = "", hold: str = "") -> None:
+    def __init__(self, *args: Any, stumble: str = "", hold: str = "", by: BaseException | None = None) -> None:
         super().__init__(*args)
-        self.stumble, self.hold = stumble, hold
+        self.stumble, self.hold, self.by = stumble, hold, by
         self.diary: list[str] = []
         self.pokes = 0
 
     async def at(self, hook: str) -> None:
         self.diary.append(f"{hook} {self.state}")
         if self.stumble == hook:
-            raise KeyError(hook)
+            raise self.by or KeyError(hook)
         if self.hold == hook:
             await asyncio.Event().wait()
 
@@ -96,7 +96,7 @@ class Walker(Component[Gait]):
         self.pokes += 1
         match asked.body.what:
             case "stumble":
-                raise KeyError("poked")
+                raise self.by or KeyError("poked")
             case "refuse":
                 raise TooSteep("no")
             case "task":

@@ -48,6 +48,62 @@ def test_a_bug_in_a_hook_ends_it_failed_and_is_raised(
         live(law())
 
 
+class Panic(BaseException):
+    """As libraries in another language raise."""
+
+
+NO_EXCEPTIONS = [Panic("no memory"), SystemExit("no camera"), BaseExceptionGroup("", [asyncio.CancelledError()])]
+SAID = {Panic: "Panic: no memory", SystemExit: "SystemExit: no camera", BaseExceptionGroup: "BaseExceptionGroup"}
+
+
+@pytest.mark.parametrize("by", NO_EXCEPTIONS, ids=lambda by: type(by).__name__)
+@pytest.mark.parametrize("where", ["connect", "serve", "task", "answer", "listener", "drain"])
+def test_what_is_no_exception_is_a_bug_like_any_other(where: str, by: BaseException) -> None:
+    """Otherwise it ends the event loop, or the component without its drain and without a reason."""
+
+    def listen(_heard: object) -> None:
+        raise by
+
+    async def law() -> None:
+        stage = Stage(stumble=where, by=by, hold="" if where == "serve" else "serve")
+        life = await stage.begin()
+        match where:
+            case "task":
+                await stage.ask(Poke("task"), Poked)
+            case "answer":
+                with pytest.raises(NoResponder):
+                    await stage.ask(Poke("stumble"), Poked)
+            case "listener":
+                stage.walker.bus.subscribe(TOWER, Conversation.EVENTS, Poked, listen)
+                stage.tower.publish(TOWER, Conversation.EVENTS, Poked(1))
+            case "drain":
+                stage.walker.end("enough")
+        with pytest.raises(RuntimeError, match=SAID[type(by)]):
+            await life
+        await stage.clock.sleep_s(0.1)
+        assert stage.states[-1].state is LifeState.FAILED
+        assert SAID[type(by)] in stage.states[-1].feedback
+        assert where == "connect" or stage.walker.diary.count("drain draining") == 1
+
+    live(law())
+
+
+@pytest.mark.parametrize("where", ["connect", "drain"])
+def test_a_cancellation_that_nobody_asked_for_is_a_bug_of_the_hook(where: str) -> None:
+    """As of the result of a cancelled task. Otherwise the component ends as if all were well, or not at all."""
+
+    async def law() -> None:
+        stage = Stage(stumble=where, by=asyncio.CancelledError(), hold="serve")
+        life = await stage.begin()
+        stage.walker.end("enough")
+        with pytest.raises(RuntimeError, match=f"walker:{where} raised CancelledError"):
+            await life
+        await stage.clock.sleep_s(0.1)
+        assert stage.states[-1].state is LifeState.FAILED
+
+    live(law())
+
+
 def test_failed_is_said_before_the_token_falls() -> None:
     async def law() -> None:
         stage = Stage(stumble="serve")

@@ -124,6 +124,24 @@ class Broken(Component[NoParameters]):
         raise RuntimeError("the bug of the sample")
 
 
+class Leaving(Component[NoParameters]):
+    """Leaves as a program does, before it is ready or in the hook that its name begins with."""
+
+    async def connect(self) -> None:
+        if self.name == "connect":
+            raise SystemExit("no camera")
+
+    async def serve(self) -> None:
+        await self.clock.sleep_s(1.0)
+        if self.name == "serve":
+            raise SystemExit("no camera")
+        self.end("its work is done")
+
+    async def drain(self) -> None:
+        if self.name == "drain":
+            raise asyncio.CancelledError
+
+
 class WeightedParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One number."""
 

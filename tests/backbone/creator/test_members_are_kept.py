@@ -226,6 +226,23 @@ def test_a_member_that_cannot_start_fails_alone(on_bench: Callable) -> None:
     on_bench(body)
 
 
+@pytest.mark.parametrize("hook", ["connect", "serve", "drain"])
+def test_a_member_that_leaves_as_a_program_does_fails_alone(on_bench: Callable, hook: str) -> None:
+    async def body(bench: Bench) -> None:
+        pid = await bench.start("Quiet", "scout1")
+        if hook == "connect":
+            with pytest.raises(StartFailed, match="exit code 1"):
+                await bench.start("Leaving", hook)
+        else:
+            await bench.start("Leaving", hook)
+            await VirtualClock().sleep_s(1.15)
+            assert [(fell.name, fell.how) for fell in bench.fell] == [(hook, "exit code 1")]
+        assert bench.pids()["scout1"] == pid
+        assert bench.zygote.forked == ["pool"]
+
+    on_bench(body)
+
+
 def test_a_member_that_is_not_ready_in_time_is_ended_alone(on_bench: Callable) -> None:
     async def body(bench: Bench) -> None:
         pid = await bench.start("Quiet", "scout1")
