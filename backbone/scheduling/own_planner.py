@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Protocol, cast
 
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
 from backbone.scheduling.planner import Planner
 from backbone.scheduling.table import Table
 
@@ -33,7 +33,8 @@ def load_planner(class_path: str) -> PlannerType | None:
     """Return the planner class at ``package.module:Class``; None for an empty path.
 
     Raises:
-        WrongPlanner: The path does not lead to a class, or the class lacks a method of a planner.
+        WrongPlanner: The path does not lead to a class, its file cannot be imported, or the class lacks a method of a
+            planner.
     """
     if not class_path:
         return None
@@ -42,6 +43,9 @@ def load_planner(class_path: str) -> PlannerType | None:
         found = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, ValueError) as error:
         raise WrongPlanner(f"{class_path}: {error}", class_path=class_path) from error
+    except (Exception, SystemExit) as error:  # a file that is being written raises anything
+        remedy = "Correct the fault that the message names in the planner's file."
+        raise WrongPlanner(f"{class_path}: {complaint(error)}", remedy=remedy, class_path=class_path) from error
     lacking = sorted(one for one in vars(Planner) if not one.startswith("_") and not _has(found, one))
     if lacking or not isinstance(found, type):
         raise WrongPlanner(f"{class_path} is no planner: it lacks {', '.join(lacking)}", class_path=class_path)

@@ -73,6 +73,24 @@ def test_no_path_is_no_planner_of_ones_own() -> None:
 
 
 @pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("def order(:", "SyntaxError: invalid syntax"),
+        ("slack = margin", "NameError: name 'margin' is not defined"),
+        ("raise SystemExit(3)", "SystemExit: 3"),
+    ],
+)
+def test_a_planner_whose_file_cannot_be_imported_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, reason: str
+) -> None:
+    (tmp_path / "planner_in_work.py").write_text(f"{line}\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(WrongPlanner, match=re.escape(reason)) as refused:
+        load_planner("planner_in_work:Planner")
+    assert "Correct the fault" in refused.value.remedy
+
+
+@pytest.mark.parametrize(
     ("path", "reason"),
     [
         ("no.such.module:Planner", "No module named 'no'"),
