@@ -34,16 +34,20 @@ from backbone.component.messages import (
     WrongParameter,
 )
 from backbone.component.name_claim import claim_name
+from backbone.component.own_tasks import OwnTasks
 from backbone.component.story import StoryBook, feedback_of
 from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
 from backbone.printable_text import printable
-from backbone.waiting import bug_of, first_of, only_bugs
+from backbone.waiting import first_of, only_bugs
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
 
+DRAIN_WITHIN_S = (
+    10.0  # chosen: ten times the longest drain of a component without processes of its own; machine seconds
+)
 CALM_S = 0.02  # chosen: longer than a context switch, which must not wait for published news; people see no difference
 
 
@@ -76,6 +80,8 @@ class Component(Generic[P_co]):
     alike_most: ClassVar[int] = 0
     """Most components of this class in one process, if a host has more of them and the mission file names no process;
     1: each has its own; 0: the placer's default, or 1 if ``shares_process`` is False."""
+    drains_within_s: ClassVar[float | None] = DRAIN_WITHIN_S
+    """Longest time of its drain after a bug, machine seconds; None: as long as it takes, because it ends others."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
 
@@ -119,8 +125,7 @@ class Component(Generic[P_co]):
         self._state, self._since_s = LifeState.CONNECTING, clock.now_s()
         self._end = asyncio.Event()
         self._bug: BaseException | None = None
-        self._group: asyncio.TaskGroup | None = None
-        self._tasks: dict[asyncio.Task[None], None] = {}  # in the order of their starts
+        self._tasks = OwnTasks(self.fail, self._task_goes_on)
         self._token: Subscription | None = None
         self._news = asyncio.Event()
         self._state_published: ComponentState | None = None
@@ -150,8 +155,9 @@ class Component(Generic[P_co]):
     async def drain(self) -> None:
         """Go to the safe state.
 
-        When: once if ``connect`` succeeded, also after a bug, when ``serve`` and all tasks have ended and the bus and
-        the liveliness token still exist. What: finish or undo work in progress, leave hardware safe. Not: begin new
+        When: once if ``connect`` succeeded, also after a bug, when ``serve`` and all tasks have ended, or go on longer
+        than ``TASKS_END_WITHIN_S``, and the bus and the liveliness token still exist. Cancelled if it takes longer than
+        ``drains_within_s`` after a bug. What: finish or undo work in progress, leave hardware safe. Not: begin new
         work.
         """
 
@@ -227,17 +233,10 @@ class Component(Generic[P_co]):
         Raises:
             RuntimeError: The component is not connecting yet.
         """
-        if self._group is None and not self._end.is_set():
+        if not (self._tasks.are_taken or self._end.is_set()):
             work.close()
             raise RuntimeError(f"{self.address} starts {name} before it connects")
-        task = (self._group or asyncio.get_running_loop()).create_task(only_bugs(work), name=f"{self.name}:{name}")
-        task.add_done_callback(lambda _ended: work.close())  # it may be cancelled before it begins
-        if self._group is None:
-            task.cancel()
-        else:
-            self._tasks[task] = None
-            task.add_done_callback(self._task_ended)
-        return task
+        return self._tasks.start(work, f"{self.name}:{name}")
 
     def report(self, feedback: str) -> None:
         """Set the feedback, which is made one printable line for people; it is published soon if it has changed."""
@@ -324,27 +323,21 @@ class Component(Generic[P_co]):
             self._token.close()
 
     async def _live(self) -> None:
-        connected = False
+        connected, self._tasks.are_taken = False, True
         try:
-            async with asyncio.TaskGroup() as group:
-                self._group = group
-                try:
-                    connected = await self._unless_ended(self.connect(), "connect")
-                    if connected:
-                        await only_bugs(self._serve_until_end(), self.name)
-                finally:
-                    self._end.set()  # also if it is killed, so that later messages start no work
-                    self._group = None
-                for task in self._tasks:
-                    task.cancel()
-        except* Exception as bugs:
-            self.fail(bugs.exceptions[0])
+            connected = await self._unless_ended(self.connect(), "connect")
+            if connected:
+                await only_bugs(self._serve_until_end(), self.name)
+        except Exception as bug:
+            self.fail(bug)
         finally:
-            self._group = None
+            self._end.set()  # also if it is killed, so that later messages start no work
+            await self._tasks.end()
         if connected:
             if self._state is LifeState.READY:
                 self._enter(LifeState.DRAINING)
-            await only_bugs(self.drain(), f"{self.name}:drain")
+            async with asyncio.timeout(None if self._bug is None else self.drains_within_s):  # else its creator counts
+                await only_bugs(self.drain(), f"{self.name}:drain")
 
     async def _serve_until_end(self) -> None:
         accepted = CommonQuestion if self.accepts is None else CommonQuestion | self.accepts
@@ -356,11 +349,8 @@ class Component(Generic[P_co]):
         await self._end.wait()
         self._enter(LifeState.DRAINING)
 
-    def _task_ended(self, task: asyncio.Task[None]) -> None:
-        self._tasks.pop(task, None)
-        if (bug := bug_of(task)) is not None:
-            self._group = None  # the group is ending and must get no new tasks
-            self.fail(bug)
+    def _task_goes_on(self, task: str) -> None:
+        self.story.note(self.name, f"{task} goes on after its cancellation")
 
     async def _unless_ended(self, work: Coroutine[object, None, None], name: str) -> bool:
         """Run the work unless the component must end first; return whether the work was finished."""

@@ -66,6 +66,7 @@ class Creator(Component[CreatorParameters]):
 
     parameters_type = CreatorParameters
     accepts = CreatorQuestion
+    drains_within_s = None
     shares_process = False
 
     _forked: ClassVar[dict[str, Zygote]] = {}

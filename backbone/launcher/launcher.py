@@ -55,6 +55,7 @@ LISTING_TIME_S = 1.0  # chosen: a thousand round trips
 class Launcher(Component[NoParameters]):
     """Starts the core services and the mission, restarts core services, runs the last branch, stops all."""
 
+    drains_within_s = None
     accepts: ClassVar[Accepts | None] = (
         ListProcesses | AskLog | AskPeople | AskDeclared | AskTree | TreeChange | EndMission | AwaitLastBranch
     )

@@ -62,6 +62,7 @@ class MachineOffer(Component[NoParameters]):
         ending: Why it ended; valid after ``run``.
     """
 
+    drains_within_s = None
     accepts: ClassVar[Accepts | None] = ListProcesses
 
     def __init__(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Coroutine
 from typing import Annotated, Any
 
@@ -63,6 +64,7 @@ class Walker(Component[Gait]):
         self.stumble, self.hold, self.by = stumble, hold, by
         self.diary: list[str] = []
         self.pokes = 0
+        self.is_over = False
 
     async def at(self, hook: str) -> None:
         self.diary.append(f"{hook} {self.state}")
@@ -101,11 +103,19 @@ class Walker(Component[Gait]):
                 raise TooSteep("no")
             case "task":
                 self.start_task(self.at("task"), "task")
+            case "deaf":
+                self.start_task(self.go_on(), "deaf")
             case "chain":
                 self.start_task(self.note_later(), "note")
             case "end":
                 self.end("poked")
         return Poked(self.pokes)
+
+    async def go_on(self) -> None:
+        """Poll as a task does that excepts everything, until the test is over."""
+        while not self.is_over:
+            with contextlib.suppress(BaseException):
+                await self.clock.sleep_s(0.1)
 
     async def note_later(self) -> None:
         await self.clock.sleep_s(0.01)

@@ -9,13 +9,15 @@ import msgspec
 import pytest
 from component_stage import TOWER, Poke, Poked, Stage, TooSteep, live
 
-from backbone.component.component import CALM_S
+from backbone.component.component import CALM_S, DRAIN_WITHIN_S
 from backbone.component.messages import (
     LifeState,
 )
+from backbone.component.own_tasks import TASKS_END_WITHIN_S
 from backbone.component.story import MAX_FEEDBACK_LENGTH
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
+from backbone.waiting import end_tasks
 from backbone.wire import WIRE_VERSION, Envelope, write
 
 # Bugs
@@ -257,5 +259,51 @@ def test_tasks_end_with_the_component() -> None:
         assert "task ready" in stage.walker.diary
         stage.walker.end("enough")
         await asyncio.wait_for(life, 1.0)
+
+    live(law())
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+def test_a_task_that_goes_on_after_its_cancellation_holds_up_neither_drain_nor_end(ordered: bool) -> None:
+    """Otherwise a bug elsewhere leaves its hardware as it is for ever, and nobody starts the component again."""
+
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        await stage.ask(Poke("deaf"), Poked)
+        if ordered:
+            stage.walker.end("enough")
+        else:
+            stage.walker.fail(KeyError("bug"))
+        await asyncio.wait({life}, timeout=TASKS_END_WITHIN_S + 0.1)
+        assert life.done()
+        assert isinstance(life.exception(), KeyError) is not ordered
+        assert stage.walker.diary[-1] == "drain draining"
+        assert "walker:deaf goes on after its cancellation" in [one.what for one in stage.walker.story.of("walker")]
+        stage.walker.is_over = True
+        await stage.clock.sleep_s(0.2)
+
+    live(law())
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+def test_after_a_bug_a_drain_that_never_returns_does_not_hold_up_the_end(ordered: bool) -> None:
+    """Nobody ordered the end, so nobody else ends the component."""
+
+    async def law() -> None:
+        stage = Stage(hold="drain")
+        life = await stage.begin()
+        if ordered:
+            stage.walker.end("enough")
+            await asyncio.wait({life}, timeout=2 * DRAIN_WITHIN_S)
+            assert not life.done(), "its creator ends it, as soon as the order says"
+            await end_tasks(life)
+            return
+        stage.walker.fail(KeyError("bug"))
+        await asyncio.wait({life}, timeout=DRAIN_WITHIN_S + 0.1)
+        assert isinstance(life.exception(), KeyError)
+        await stage.clock.sleep_s(0.1)
+        assert stage.states[-1].state is LifeState.FAILED
+        assert stage.observed[-1] == "no token"
 
     live(law())
