@@ -17,7 +17,7 @@ from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.child_keeper import AGAIN_AFTER_S, end_task
 from mission_control.gated_bus import GatedBus
 from mission_control.messages import BehaviorStatus
-from resource_pool.arc_client import ArcClient, EmergencyStopped, SwappedOut
+from resource_pool.arc_client import ArcClient, EmergencyStopped, StaleEpoch, SwappedOut
 
 log = logging.getLogger(__name__)
 
@@ -84,7 +84,7 @@ class Acting:
                     self.resumes_again = False
                     await self._hooks.resumed(arc.granted.rcs if arc.granted is not None else {})
                 return await self._hooks.act()
-            except SwappedOut as refusal:  # the grant ended first; ``resumed`` begins the next turn
+            except (SwappedOut, StaleEpoch) as refusal:  # the grant ended first; ``resumed`` begins the next turn
                 log.info("%s stopped acting: %s", self._actor.name, refusal.detail)
                 return None
             except LinkError as error:

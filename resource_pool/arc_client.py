@@ -19,6 +19,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import Ended, StopComponent
 from backbone.placer.wishes import Wish
+from backbone.rc_manager.messages import StaleEpoch
 from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
@@ -95,6 +96,7 @@ __all__ = [
     "Resumed",
     "ShapeKind",
     "SliceEnds",
+    "StaleEpoch",
     "StopState",
     "Stopper",
     "Suspended",

@@ -8,7 +8,7 @@ from behaviors_of_a_placer import ARC, node, root
 from fake_resource_pool import FakePlacer, Run
 
 from backbone.keys import Conversation
-from resource_pool.arc_client import EmergencyStopped, StopState
+from resource_pool.arc_client import EmergencyStopped, StaleEpoch, StopState
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop
 
@@ -40,6 +40,25 @@ def test_a_command_that_came_too_late_ends_acting_quietly(placer_world: Run) -> 
         arc.granted = False
         await placer.clock.sleep_s(1.0)
         assert placer.components["driver"] is driver
+        await arc.grant()
+        await placer.wait(lambda: arc.commands and arc.commands[-1][1] == 2)
+
+    placer_world(scene)
+
+
+def test_a_command_that_its_rc_refused_because_the_grant_had_ended_ends_acting_quietly(placer_world: Run) -> None:
+    """A person who takes the robot over takes its RCs while the ARC still passes a command on."""
+
+    async def scene(placer: FakePlacer) -> None:
+        driver = await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        arc.refusal = StaleEpoch("scout1: driver-capture commands under epoch 1, it has no connection")
+        await arc.grant()
+        await placer.clock.sleep_s(1.0)
+        assert placer.components.get("driver") is driver
+        await arc.suspend()
+        arc.refusal = None
         await arc.grant()
         await placer.wait(lambda: arc.commands and arc.commands[-1][1] == 2)
 
