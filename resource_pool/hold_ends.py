@@ -16,6 +16,7 @@ from backbone.errors import LinkError, Refusal, complaint
 from backbone.waiting import only_bugs
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.holds import Hold, HoldTable
+from resource_pool.orders_in_progress import OrdersInProgress
 
 log = logging.getLogger(__name__)
 
@@ -52,10 +53,11 @@ class HoldEnds:
 
     Attributes:
         faults: Number of attempts that did not reach the safe state.
+        orders: The commands that the RC is carrying out.
     """
 
     def __init__(self, rc: RcOfHolds) -> None:
-        self.faults = 0
+        self.faults, self.orders = 0, OrdersInProgress(rc.name)
         self._rc = rc
         self._unsafe: dict[str, Hold] = {}
         self._remark = ""
@@ -79,6 +81,7 @@ class HoldEnds:
         self._unsafe[hold.arc] = hold
         try:
             async with asyncio.timeout(SAFE_WITHIN_S):
+                await self.orders.cut_off(hold)
                 await only_bugs(rc.make_safe(hold), f"make_safe of {rc.name}")
         except Exception as error:
             detail = detail_of(error)

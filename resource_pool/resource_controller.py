@@ -154,8 +154,8 @@ class ResourceController(Component[R], Generic[R]):
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Carry out a command.
 
-        When: for each command of a present hold. What: return the applied values, clipped to the hardware's limits,
-        with units in their names. Raise ``HardwareFault`` if the hardware does not obey.
+        When: for each command of a present hold; cancelled when the hold ends. What: return the applied values, clipped
+        to the hardware's limits, with units in their names. Raise ``HardwareFault`` if the hardware does not obey.
         """
         raise UnknownMessage(f"{self.name} declares {order.word()} and does not obey it", arc=hold.arc)
 
@@ -166,7 +166,7 @@ class ResourceController(Component[R], Generic[R]):
             return await super().answer(asked)
         hold = self.admit(order.arc, order.epoch)
         self.permit(order)
-        values = await self.obey(hold, order)
+        values = await self._ends.orders.run(hold, self.obey(hold, order))
         return Applied(self.name, hold.epoch, self.clock.now_s(), order.word(), dict(values))
 
     async def driver_exchanged(self) -> None:

@@ -12,6 +12,7 @@ from pool_orders import ROBOTS, at, command, connect, disconnect
 
 from backbone.bus.clock import run_virtual
 from backbone.errors import Refusal
+from backbone.rc_manager.messages import StaleEpoch
 from backbone.wire import Envelope
 from resource_pool.commands import Drive
 from resource_pool.messages import LoadPacket, PacketLoaded
@@ -100,7 +101,8 @@ def test_a_command_that_ends_after_its_hold_leaves_no_dead_man_behind(local_miss
             driving = asyncio.create_task(command(pool, "one", 1, Drive(5.0, 5.0)))
             await pool.clock.sleep_s(0.1)
             await disconnect(pool, "scout1", "one", 1)
-            await driving
+            with pytest.raises(StaleEpoch):
+                await driving
             await connect(pool, "scout1", "two", 2, companions={"radio": 2})
             await asyncio.wait_for(pool.clock.sleep_s(1.5), 2.0)
             assert pool.running["scout1"].statistics()["command_timeouts"] == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
@@ -15,8 +16,11 @@ from backbone.errors import NoResponder, OutcomeUnknown, Refusal, ReplyTimeout
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, StaleEpoch
 from backbone.scheduling.requests import RcUse
 from backbone.wire import Message
+from resource_pool.commands import Command
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.holds import Hold
+from resource_pool.messages import Applied
+from resource_pool.rcs.skeleton import Lamp, Shine
 from resource_pool.resource_controller import RcParameters, ResourceController
 
 LEASE_S = 2.0
@@ -171,5 +175,66 @@ def test_a_bug_in_a_connection_ends_the_rc_in_its_safe_state(local_mission: Any,
                 await _connect(pool, "one", "two")
             assert isinstance(await pool.outcome("lights"), KeyError | RuntimeError)
             assert sorted(rc.diary[2:]) == ["off for one", "off for two"]
+
+    run_virtual(main())
+
+
+class WarmingLamp(Lamp):
+    """A lamp that needs 0.3 s until it shines."""
+
+    hurried = True
+
+    async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
+        warm_s = self.clock.now_s() + 0.3
+        while self.clock.now_s() < warm_s:
+            try:
+                await self.clock.sleep_until_s(warm_s)
+            except asyncio.CancelledError:
+                if self.hurried:
+                    raise
+        return await super().obey(hold, order)
+
+
+@pytest.mark.parametrize("end", ["disconnection", "lease", "new connection", "end of the RC"])
+def test_a_command_in_progress_does_not_follow_the_safe_state(local_mission: Any, end: str) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            lamp = await pool.start(WarmingLamp, "lights", {"driver": "resource_pool.rcs.skeleton:PaintedLamp"})
+            await _connect(pool, "one")
+            await pool.clock.sleep_s(LEASE_S - 0.1)
+            shine = Shine(1.0).under("one", 1)
+            shining = asyncio.create_task(pool.voice("one").ask("resource_pool/lights", shine, Applied, within_s=1.0))
+            await pool.clock.sleep_s(0.05)
+            match end:
+                case "disconnection":
+                    await _order(pool, Disconnect("one", 1), Disconnected)
+                case "new connection":
+                    await _order(pool, Connect("one", 2, LEASE_S, RcUse(), {}), Connected)
+                case "end of the RC":
+                    lamp.end("enough")
+            with pytest.raises(StaleEpoch, match="before its command was carried out"):
+                await shining
+            await pool.clock.sleep_s(0.5)
+            events = [event.what for event in lamp.story.of("lights")]
+            assert "is dark" in events
+            assert not [what for what in events if what.startswith("shines")]
+            if end == "end of the RC":
+                assert await pool.outcome("lights") is None
+
+    run_virtual(main())
+
+
+def test_a_command_that_goes_on_after_its_cancellation_does_not_hold_up_the_safe_state(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            lamp = await pool.start(WarmingLamp, "lights", {"driver": "resource_pool.rcs.skeleton:PaintedLamp"})
+            lamp.hurried = False
+            await _connect(pool, "one")
+            shine = Shine(1.0).under("one", 1)
+            shining = asyncio.create_task(pool.voice("one").ask("resource_pool/lights", shine, Applied, within_s=1.0))
+            await pool.clock.sleep_s(0.05)
+            await _order(pool, Disconnect("one", 1), Disconnected)
+            assert lamp.story.of("lights")[-1].what == "is dark"
+            await shining
 
     run_virtual(main())

@@ -1,0 +1,61 @@
+"""Commands that an RC is carrying out: the end of their hold cuts them off, so that none follows the safe state."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable
+from typing import TypeVar
+
+from backbone.rc_manager.messages import StaleEpoch
+from resource_pool.holds import Hold
+
+T = TypeVar("T")
+CUT_WITHIN_S = 0.1  # chosen: of the time for the safe state, so that it is reached even if a command goes on
+
+
+class OrdersInProgress:
+    """The commands of all holds of one RC.
+
+    Args:
+        rc: Its name, for refusals.
+    """
+
+    def __init__(self, rc: str) -> None:
+        self._rc = rc
+        self._going: dict[asyncio.Task[object], Hold] = {}
+        self._cut: set[asyncio.Task[object]] = set()
+
+    async def run(self, hold: Hold, work: Awaitable[T]) -> T:
+        """Return the result of the work.
+
+        Raises:
+            StaleEpoch: The hold ended first; the work was cancelled.
+        """
+        task = asyncio.current_task()
+        assert task is not None  # noqa: S101  a coroutine runs in a task
+        self._going[task] = hold
+        try:
+            return await work
+        except asyncio.CancelledError:
+            if task not in self._cut or task.uncancel():  # somebody else ends the task
+                raise
+            raise StaleEpoch(
+                f"{hold.arc} lost {self._rc} before its command was carried out", epoch=hold.epoch
+            ) from None
+        finally:
+            del self._going[task]
+            self._cut.discard(task)
+
+    async def cut_off(self, hold: Hold) -> None:
+        """Cancel the commands of this hold; return when they have ended, or go on for ``CUT_WITHIN_S``."""
+        going = [
+            task
+            for task, under in self._going.items()
+            if (under.arc, under.epoch) == (hold.arc, hold.epoch) and task is not asyncio.current_task()
+        ]
+        if not going:
+            return
+        for task in going:
+            self._cut.add(task)
+            task.cancel()
+        await asyncio.wait(going, timeout=CUT_WITHIN_S)
