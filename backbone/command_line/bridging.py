@@ -30,5 +30,5 @@ async def bridge(where: Where, host: str, port: int, keys: tuple[str, ...]) -> E
                 if dropped := sum(one.dropped for one in subscribed):
                     say(f"{counted(dropped, 'message')} came faster than they could be shown")
         finally:
-            served.close()
+            await served.close()
     return ExitCode.DONE

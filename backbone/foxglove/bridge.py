@@ -7,6 +7,7 @@ threads of its own. If a viewer is too slow, the library drops the oldest messag
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import foxglove
@@ -19,9 +20,11 @@ from backbone.recording.reader import heard_now
 from backbone.recording.revival import message_as_sent
 from backbone.recording.translation import Translated
 from backbone.recording.writer import NS, topic_of
+from backbone.waiting import in_thread_within
 from backbone.wire import Message, schema_of
 
 MOST_WAITING = 512  # chosen: half of the library's; in the shipped mission some 10 s, of which pictures are 10 MB
+CLOSE_WITHIN_S = 1.0  # chosen: a viewer that reads is disconnected within milliseconds; seconds of the machine
 JSON = "json"
 
 
@@ -85,9 +88,10 @@ class Bridge(ServerListener):
             described = Schema(name=message.schema, encoding="jsonschema", data=schema)
             self._show((topic_of(key, message.schema), JSON), described, message.data, at_ns)
 
-    def close(self) -> None:
-        """Disconnect all viewers."""
-        self._server.stop()
+    async def close(self) -> None:
+        """Disconnect all viewers; after ``CLOSE_WITHIN_S``, clients that do not read are left to the process's end."""
+        with suppress(TimeoutError):  # the library waits for each of its clients without a limit
+            await in_thread_within(self._server.stop, CLOSE_WITHIN_S)
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002  of the library
         """Send the newest message to a late viewer, because some messages are published only on a change."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import socket
 import struct
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -15,10 +17,11 @@ from free_ports import free_port
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from backbone.foxglove.bridge import Bridge
+from backbone.foxglove.bridge import CLOSE_WITHIN_S, Bridge
 from backbone.foxglove.well_known import installed
 from backbone.recording.known_messages import message_classes
 from backbone.recording.translation import Translator
+from backbone.waiting import in_thread_within
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 from resource_pool.messages import Frame, Readings
 
@@ -83,10 +86,10 @@ async def viewing(port: int) -> AsyncIterator[Viewer]:
 
 
 @pytest.fixture
-def bridge() -> Any:
+async def bridge() -> AsyncIterator[Bridge]:
     made = Bridge("night", "127.0.0.1", free_port(), installed())
     yield made
-    made.close()
+    await made.close()
 
 
 def hear(bridge: Bridge, key: str, message: Message, at_s: float) -> None:
@@ -127,6 +130,14 @@ async def test_who_watches_can_say_nothing(bridge: Bridge) -> None:
         said = {"id": 1, "topic": "/resource_pool/scout1/ask", "encoding": "json", "schemaName": "Halt/1"}
         await viewer.say({"op": "advertise", "channels": [said]})
         assert "clientPublish" in await viewer.complaint()
+
+
+async def test_a_client_that_says_nothing_delays_the_end_by_seconds_at_most() -> None:
+    bridge = Bridge("night", "127.0.0.1", free_port(), installed())
+    with socket.create_connection(("127.0.0.1", bridge.port)):
+        async with viewing(bridge.port):
+            pass  # the bridge accepts clients in the order in which they come
+        await in_thread_within(lambda: asyncio.run(bridge.close()), 5 * CLOSE_WITHIN_S)  # a hang is a failure, no hang
 
 
 async def test_bytes_that_are_no_message_are_not_shown_and_unknown_ones_have_no_schema(bridge: Bridge) -> None:
