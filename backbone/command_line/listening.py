@@ -30,7 +30,7 @@ def opening_port(host: str, port: int) -> Iterator[None]:
     """
     try:
         yield
-    except (OSError, RuntimeError) as error:  # the latter by Foxglove's library
+    except (OSError, UnicodeError, RuntimeError) as error:  # by a host like 192.168..1; by Foxglove's library
         raise PortUnusable(f"cannot listen at {host}:{port}: {error}", host=host, port=port) from error
 
 

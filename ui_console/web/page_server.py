@@ -359,8 +359,9 @@ async def _listen(
             max_queue=MOST_UNREAD,
             write_limit=SEND_AHEAD_BYTES,
         )
-    except OSError as error:
-        raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error
+    except (OSError, UnicodeError) as error:  # the latter by a host like 192.168..1
+        reason = getattr(error, "strerror", None) or error
+        raise CannotListen(f"cannot listen at {host}:{port}: {reason}") from error
 
 
 def port_of(server: Server) -> int:

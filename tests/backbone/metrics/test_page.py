@@ -9,6 +9,7 @@ import pytest
 from free_ports import free_port
 from prometheus_client.parser import text_string_to_metric_families
 
+from backbone.command_line.listening import PortUnusable, opening_port
 from backbone.metrics.page import MetricsServer, Numbers, metrics
 from backbone.metrics.tally import Tally
 from backbone.rc_manager.messages import Leases
@@ -41,6 +42,13 @@ def port(numbers: Numbers) -> Iterator[int]:
     server = MetricsServer("127.0.0.1", port, lambda: metrics(numbers))
     yield port
     server.close()
+
+
+@pytest.mark.parametrize("host", ["192.0.2.1", "192.168..1"], ids=["of no machine here", "no name of a host"])
+def test_an_address_that_cannot_be_had_is_refused_with_a_remedy(host: str) -> None:
+    with pytest.raises(PortUnusable, match=f"at {host}:1") as refused, opening_port(host, 1):
+        MetricsServer(host, 1, list)
+    assert "--host" in refused.value.remedy
 
 
 def test_all_numbers_are_on_the_page_under_their_names(port: int) -> None:

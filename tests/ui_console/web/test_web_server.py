@@ -300,9 +300,10 @@ async def test_only_so_many_operators_are_served_and_the_next_is_told_so(
         await anna.wait(lambda: anna.has_alarm("ben found 1 client there"), "alarm")
 
 
-async def test_an_address_that_cannot_be_had_is_refused_with_a_remedy(stage: Stage) -> None:
+@pytest.mark.parametrize("host", ["127.0.0.1", "192.168..1"], ids=["its port is taken", "no name of a host"])
+async def test_an_address_that_cannot_be_had_is_refused_with_a_remedy(stage: Stage, host: str) -> None:
     with pytest.raises(CannotListen, match=str(stage.port)) as refused:
-        await WebServer(Console(stage.hub, Authenticator(RIGHTS))).run("127.0.0.1", stage.port, lambda port: None)
+        await WebServer(Console(stage.hub, Authenticator(RIGHTS))).run(host, stage.port, lambda port: None)
     assert "--port" in refused.value.remedy
 
 
