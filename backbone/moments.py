@@ -12,6 +12,8 @@ _AGO = re.compile(r"(\d+(?:\.\d+)?)(s|m|h|d)")
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3_600.0, "d": 86_400.0}
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}))?")
 _MISSION_TIME = re.compile(r"\d+(?:\.\d+)?")
+FIRST_DAY, LAST_DAY = datetime.min + timedelta(days=2), datetime.max - timedelta(days=2)
+"""Limits of a time of day, two days inside the range of dates: a conversion between time zones stays in the range."""
 
 
 class NoMoment(Refusal):
@@ -35,8 +37,12 @@ class Now:
     rate: float = 1.0
 
     def time_of_day(self, at_s: float) -> datetime:
-        """Return this machine's local time at a mission time."""
-        return self.here - timedelta(seconds=(self.mission_s - at_s) / self.rate)
+        """Return this machine's local time at a mission time, limited to ``FIRST_DAY`` and ``LAST_DAY``."""
+        try:
+            shown = self.here - timedelta(seconds=(self.mission_s - at_s) / self.rate)
+        except OverflowError:
+            return FIRST_DAY if at_s < self.mission_s else LAST_DAY
+        return min(max(shown, FIRST_DAY), LAST_DAY)
 
 
 def moment(text: str, now: Now) -> float:

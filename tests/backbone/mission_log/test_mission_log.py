@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -15,9 +15,10 @@ from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import ComponentState, LifeState, LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.mission_log.lines import log_json, log_lines
-from backbone.mission_log.log import AskLog, Log, LogKeeper, MissionLog
+from backbone.mission_log.log import FOR_EVER_S, AskLog, Log, LogKeeper, MissionLog
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.moments import Now
+from backbone.ranges import A_DAY_S
 from backbone.wire import MAX_MESSAGE_BYTES, WIRE_VERSION, Envelope, write
 
 CONSOLE = "ui_console/console-7"
@@ -114,6 +115,14 @@ def test_the_keeper_hears_components_and_people_and_calls_people_by_their_names(
 def test_a_line_has_the_time_of_day_the_mission_time_and_what_happened() -> None:
     [line] = log_lines(Log([STOPPED]), NOW)
     assert " ".join(line.split()) == "14:08:40 20.00 s !! scout1 ben stops it: child in the room"
+
+
+@given(st.floats(-A_DAY_S, FOR_EVER_S), st.floats(0, 1_000, exclude_min=True))
+@example(FOR_EVER_S, 1.0)
+def test_an_event_of_any_time_that_a_message_carries_has_a_line(at_s: float, rate: float) -> None:
+    log, now = Log([event(at_s, "scout1", "happened")]), Now(100.0, NOW.here, rate)
+    assert [line.endswith("happened") for line in log_lines(log, now)] == [True]
+    assert json.loads(json.dumps(log_json(log, now)))["events"][0]["at_s"] == at_s
 
 
 def test_an_export_is_one_object_with_everything_in_it() -> None:
