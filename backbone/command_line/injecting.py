@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import operator
 from typing import Any
 
@@ -58,10 +59,10 @@ def read_object(text: str) -> object:
     """Return what a person wrote as JSON.
 
     Raises:
-        OtherForm: It is no JSON, too deep, or an object has a name twice.
+        OtherForm: It is no JSON, too deep, an object has a name twice, or a number is too large.
     """
     try:
-        return json.loads(text, object_pairs_hook=_each_name_once)
+        return json.loads(text, object_pairs_hook=_each_name_once, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
         raise OtherForm(f"it is no JSON: {error}", remedy=WRITE_ONE) from error
 
@@ -71,6 +72,14 @@ def _each_name_once(pairs: list[tuple[str, object]]) -> dict[str, object]:
     if len(said) < len(pairs):
         raise ValueError("a name stands twice in one object")
     return said
+
+
+def _finite(text: str) -> float:
+    """Return the number; the message would have no value in place of one that is not finite."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is no finite number")
+    return number
 
 
 def _place(key: str, mission: str) -> tuple[str, Conversation]:

@@ -22,8 +22,11 @@ DEEP = "[" * 10_000 + "]" * 10_000
         (DEEP, "no JSON"),
         ('{"schema": "AskState", "schema": "Stop"}', "twice"),
         ('{"schema": "SetParameter", "deep": {"a": 1, "a": 2}}', "twice"),
+        ('{"schema": "SetParameter", "name": "limit", "value": NaN}', "NaN"),
+        ('{"schema": "SetParameter", "name": "limit", "value": [-Infinity]}', "-Infinity"),
+        ('{"schema": "SetParameter", "name": "limit", "value": 1e999}', "1e999"),
     ],
-    ids=["nothing", "Python", "deep", "twice", "twice within"],
+    ids=["nothing", "Python", "deep", "twice", "twice within", "no number", "no end", "too large"],
 )
 def test_what_is_no_json_is_refused_with_how_to_write_it(text: str, told: str) -> None:
     with pytest.raises(OtherForm, match=told) as refused:
