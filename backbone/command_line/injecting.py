@@ -13,9 +13,10 @@ from backbone.command_line.watching import mission_classes
 from backbone.command_line.where import Where
 from backbone.errors import Refusal
 from backbone.keys import COPIED, ROOT, Conversation
+from backbone.keys import key as key_of
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission_log.operators import OperatorAction, publish_action
-from backbone.naming import component_of, did_you_mean
+from backbone.naming import IllegalName, component_of, did_you_mean
 from backbone.recording.json_schema import TAG
 from backbone.recording.revival import WRITE_ONE, OtherForm, message_from
 from backbone.wire import plain, schema_of
@@ -93,4 +94,8 @@ def _place(key: str, mission: str) -> tuple[str, Conversation]:
     known = {one.value: one for one in Conversation if one not in LEFT_OUT}
     if name not in known or "/" not in address or "*" in address:
         raise NoKey(f"{key!r} is no key of one component{did_you_mean(name, known)}")
+    try:
+        key_of(mission, address, known[name])
+    except IllegalName as error:
+        raise NoKey(f"{key!r} is no key of one component: {error.detail}") from error
     return address, known[name]

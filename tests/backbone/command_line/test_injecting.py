@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
 import pytest
 
-from backbone.command_line.injecting import read_object
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.command_line import injecting
+from backbone.command_line.injecting import NoKey, read_object
 from backbone.command_line.options import json_or_text
-from backbone.component.messages import SetParameter
+from backbone.command_line.where import Where
+from backbone.component.messages import AskTime, SetParameter
+from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed
 from backbone.recording.revival import WRITE_ONE, OtherForm, message_from
-from backbone.wire import schema_of
+from backbone.wire import Envelope, Message, schema_of
 
-CLASSES = {schema_of(SetParameter): SetParameter}
+CLASSES: dict[str, type[Message]] = {schema_of(kind): kind for kind in (AskTime, SetParameter)}
 DEEP = "[" * 10_000 + "]" * 10_000
 
 
@@ -32,6 +42,35 @@ def test_what_is_no_json_is_refused_with_how_to_write_it(text: str, told: str) -
     with pytest.raises(OtherForm, match=told) as refused:
         read_object(text)
     assert refused.value.remedy == WRITE_ONE
+
+
+@pytest.mark.parametrize(
+    "key",
+    ["/resource_pool/scout1/ask", "resource_pool//ask", "resource_pool/sc?t/readings", "resource_pool/*/ask", "ask"],
+)
+def test_a_key_of_no_component_is_refused_and_the_log_names_no_sender(
+    key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    acted: list[Envelope[OperatorActed]] = []
+
+    @asynccontextmanager
+    async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
+        bus = LocalBus(LocalNetwork("night"), "ui_console/cli-1", VirtualClock())
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, acted.append)
+        try:
+            yield bus, VirtualClock()
+        finally:
+            await asyncio.sleep(1.0)  # what was published arrives
+
+    async def mission_classes(_bus: object) -> dict[str, type[Message]]:
+        return CLASSES
+
+    monkeypatch.setattr(injecting, "connected", connected)
+    monkeypatch.setattr(injecting, "mission_classes", mission_classes)
+    with pytest.raises(NoKey) as refused:
+        run_virtual(injecting.inject(Where(None, None, None), key, '{"schema": "AskTime"}', 1.0))
+    assert key in refused.value.detail
+    assert not acted
 
 
 @pytest.mark.parametrize("said", [{}, {"name": 5}, {"name": "x", "value": None, "user": "a" * 10_000}], ids=str)
