@@ -20,7 +20,7 @@ async def bridge(where: Where, host: str, port: int, keys: tuple[str, ...]) -> E
         PortUnusable: The port cannot be opened.
     """
     go_behind_others()
-    async with connected(where) as (bus, clock), until_ended(bus) as ended:
+    async with connected(where) as (bus, clock), until_ended(bus, clock) as ended:
         with opening_port(host, port):
             served = Bridge(bus.mission, host, port, installed())
         try:

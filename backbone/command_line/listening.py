@@ -7,7 +7,8 @@ import signal
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 
-from backbone.bus.interface import Bus
+from backbone.bus.interface import Bus, Clock
+from backbone.component.mission_time import was_started_again
 from backbone.errors import Refusal
 from backbone.launcher.endings import say
 
@@ -35,20 +36,25 @@ def opening_port(host: str, port: int) -> Iterator[None]:
 
 
 @contextmanager
-def watching_end(bus: Bus, ended: Callable[[str], None]) -> Iterator[None]:
-    """Call a function with a line for people if, before the block's end, the mission's hub was away for long.
+def watching_end(bus: Bus, clock: Clock, ended: Callable[[str], None]) -> Iterator[None]:
+    """Call a function with a line for people if, before the block's end, the mission ended or was started again.
 
-    Long is ``GONE_AFTER_S``.
+    It has ended if its hub was away for ``GONE_AFTER_S``. If it is started again sooner, the link leads to a mission
+    of the same name whose time the clock does not show.
     """
     loop = asyncio.get_running_loop()
     line = f"{bus.mission} has ended, or its hub cannot be reached"
     timer = loop.call_later(GONE_AFTER_S, ended, line)  # the hub may have left just now, and then no news comes
+    comparing: asyncio.Task[None] | None = None
+    was_away = False
 
     def link_changed(is_up: bool) -> None:
-        nonlocal timer
+        nonlocal timer, comparing, was_away
         timer.cancel()
         if not is_up:
-            timer = loop.call_later(GONE_AFTER_S, ended, line)
+            timer, was_away = loop.call_later(GONE_AFTER_S, ended, line), True
+        elif was_away and (comparing is None or comparing.done()):
+            comparing = loop.create_task(_compare_times(bus, clock, ended), name="the mission's time")
 
     watching = bus.watch_link(link_changed)
     try:
@@ -56,14 +62,22 @@ def watching_end(bus: Bus, ended: Callable[[str], None]) -> Iterator[None]:
     finally:
         watching.close()
         timer.cancel()
+        if comparing is not None:
+            comparing.cancel()
+
+
+async def _compare_times(bus: Bus, clock: Clock, ended: Callable[[str], None]) -> None:
+    if await was_started_again(bus, clock):
+        ended(f"{bus.mission} was started again; repeat the command for the new mission")
 
 
 @asynccontextmanager
-async def until_ended(bus: Bus, for_s: float | None = None) -> AsyncIterator[asyncio.Event]:
-    """Yield an event that is set by a signal, by a bug, or once the mission's hub was away for ``GONE_AFTER_S``.
+async def until_ended(bus: Bus, clock: Clock, for_s: float | None = None) -> AsyncIterator[asyncio.Event]:
+    """Yield an event that is set by a signal, by a bug, or once the mission ended or was started again.
 
     Args:
         bus: Of the command; not closed.
+        clock: Of the mission that the command shows.
         for_s: The event is set after so many seconds of the machine, too; None: not by time.
 
     Raises:
@@ -85,7 +99,7 @@ async def until_ended(bus: Bus, for_s: float | None = None) -> AsyncIterator[asy
         loop.add_signal_handler(number, ended.set)
     bus.on_bug = failed
     try:
-        with watching_end(bus, gone):
+        with watching_end(bus, clock, gone):
             yield ended
     finally:
         if timer is not None:

@@ -23,7 +23,7 @@ async def serve_metrics(where: Where, host: str, port: int) -> ExitCode:
         PortUnusable: The port cannot be opened.
     """
     go_behind_others()
-    async with connected(where) as (bus, clock), until_ended(bus) as ended:
+    async with connected(where) as (bus, clock), until_ended(bus, clock) as ended:
         loop, watch = asyncio.get_running_loop(), MetricsWatch(bus, clock)
 
         async def now() -> Metrics:

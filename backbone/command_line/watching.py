@@ -82,7 +82,7 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
     async with (
         connected(where) as (bus, clock),
         overhearing(bus, clock, wanted.keys, heard),
-        until_ended(bus, wanted.for_s) as ended,
+        until_ended(bus, clock, wanted.for_s) as ended,
     ):
         await first_of(ended.wait(), enough.wait())
     return ExitCode.DONE
@@ -96,7 +96,7 @@ async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
         traffic.add(key, message.source, message.schema, message.size_bytes)
 
     async with connected(where) as (bus, clock), overhearing(bus, clock, wanted.keys, heard) as subscribed:
-        async with until_ended(bus, wanted.for_s) as ended:
+        async with until_ended(bus, clock, wanted.for_s) as ended:
             while not ended.is_set():
                 traffic.rows.clear()
                 began_s = clock.now_s()

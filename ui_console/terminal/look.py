@@ -90,7 +90,7 @@ async def look_into(where: Where, name: str, view: str, options: LookOptions) ->
                 f"{name} has no view {view!r}{did_you_mean(view, names)}; it has: {', '.join(names) or 'none yet'}"
             )
         looked = _Looked(bus, clock, behavior, meant)
-        with watching_end(bus, looked.mission_ended):
+        with watching_end(bus, clock, looked.mission_ended):
             code = await _shown(looked, options)
         if looked.farewell:
             say(looked.farewell)

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 
 import pytest
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import LinkListener, Subscription
 from backbone.bus.local_bus import LocalBus, LocalNetwork
@@ -15,6 +16,8 @@ from backbone.command_line import watching
 from backbone.command_line.listening import GONE_AFTER_S, until_ended
 from backbone.command_line.watching import Watched
 from backbone.command_line.where import Where
+from backbone.component.messages import AskTime, MissionTime
+from backbone.component.mission_time import REPLY_TIME_S
 from backbone.debug_views import LookAt, LookedAt, ViewEntry, ViewKind, Views
 from backbone.launcher.endings import ExitCode
 from ui_console.terminal import look
@@ -39,7 +42,7 @@ class LinkedBus(LocalBus):
 
 
 async def lasted_s(bus: LocalBus, for_s: float | None = None) -> float:
-    async with until_ended(bus, for_s) as ended:
+    async with until_ended(bus, VirtualClock(), for_s) as ended:
         await ended.wait()
     return VirtualClock().now_s()
 
@@ -62,6 +65,44 @@ def test_a_command_ends_and_says_so_once_the_hub_was_away_for_seconds(
 
     assert run_virtual(play()) == pytest.approx(ends_s)
     assert capsys.readouterr().err == "night has ended, or its hub cannot be reached\n"
+
+
+@pytest.mark.parametrize("again", [[], [(102.5, DOWN), (102.7, UP)]], ids=["away once", "away twice"])
+def test_a_command_ends_and_says_so_once_its_mission_was_started_again(
+    again: list[tuple[float, bool]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    link = [(0.0, UP), (100.0, DOWN), (102.0, UP), *again]
+
+    async def play() -> float:
+        bus = LinkedBus(link)
+        asyncio.get_running_loop().call_at(103.0, serve_time, bus, 102.0)
+        async with asyncio.timeout(FOR_HOURS_S):
+            return await lasted_s(bus)
+
+    assert run_virtual(play()) == pytest.approx(103.0, abs=2 * REPLY_TIME_S)
+    assert "night was started again" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("behind_s", [0.0, 0.5, -3600.0], ids=["same", "by the way of an answer", "the clock slept"])
+def test_a_command_goes_on_if_only_the_hub_was_started_again(
+    behind_s: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async def play() -> float:
+        bus = LinkedBus([(0.0, UP), (100.0, DOWN), (102.0, UP)])
+        asyncio.get_running_loop().call_at(103.0, serve_time, bus, behind_s)
+        return await lasted_s(bus, 200.0)
+
+    assert run_virtual(play()) == pytest.approx(200.0)
+    assert capsys.readouterr().err == ""
+
+
+def serve_time(bus: LocalBus, origin_s: float) -> None:
+    """Answer as the nameserver of a mission that began at this time."""
+
+    async def answer(_asked: object) -> MissionTime:
+        return MissionTime(VirtualClock().now_s() - origin_s, 1.0)
+
+    LocalBus(bus.network, NAMESERVER, VirtualClock()).serve(NAMESERVER, AskTime, answer)
 
 
 def test_a_command_ends_after_its_time_and_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
