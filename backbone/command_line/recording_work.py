@@ -129,6 +129,8 @@ async def record_to(
     say(f"{path}: {counted(recorder.written, 'message')}")
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
+    if recorder.was_started_again:
+        say("the recording ended because the mission was started again")
     if recorder.full:
         say(f"the recording ended because {recorder.full}")
     return ExitCode.REFUSED if recorder.full else ExitCode.DONE

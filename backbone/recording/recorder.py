@@ -24,6 +24,7 @@ from backbone.component.messages import (
     Story,
     StoryEvent,
 )
+from backbone.component.mission_time import was_started_again
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
 from backbone.keys import ROOT, Conversation
@@ -107,7 +108,9 @@ class Recorder:
         self._bug: BaseException | None = None
         self._one_at_a_time, self._needs_snapshot = asyncio.Lock(), asyncio.Event()
         self._ended = asyncio.Event()
-        self._has_link = True
+        self._has_link, self._is_back = True, asyncio.Event()
+        self.was_started_again = False
+        """True: it ended because a later mission of the same name is up."""
         self.on_flushed: Callable[[], None] = lambda: None
         """Called after each flush; settable."""
         self.full = ""
@@ -145,17 +148,20 @@ class Recorder:
         self._say(f"{self._who} records the mission to {self._files.path.name}", LogLevel.NOTICE)
         on_begun()
         asking = asyncio.create_task(self._ask(), name="what was said before")
+        comparing = asyncio.create_task(self._end_with_mission(), name="a later mission")
         try:
             await self._flush_until_end()
         finally:
             asking.cancel()
-            await asyncio.wait({asking})
+            comparing.cancel()
+            await asyncio.wait({asking, comparing})
             await self._hear_the_last()
             if self._ear is not None:
                 await self._ear.close()
             self._finish()
-        if not asking.cancelled():
-            asking.result()
+        for each in (asking, comparing):
+            if not each.cancelled():
+                each.result()
         if self._bug is not None:
             raise self._bug
 
@@ -244,7 +250,17 @@ class Recorder:
         self.full = self.full or why
 
     def _link_changed(self, is_up: bool) -> None:
+        if is_up and not self._has_link:
+            self._is_back.set()
         self._has_link = is_up
+
+    async def _end_with_mission(self) -> None:
+        """End if a later mission of the same name is up after a loss of the link; write none of its messages then."""
+        while not self.was_started_again:
+            await self._is_back.wait()
+            self._is_back.clear()
+            self.was_started_again = await was_started_again(self._bus, self._clock)
+        self.end()
 
     def _alive_changed(self, address: str, alive: bool) -> None:
         now_s = self._clock.now_s()
@@ -274,7 +290,7 @@ class Recorder:
     def _heard(self, key: str, raw: bytes) -> None:
         if key in self._awaited:
             self._was_told.set()
-        if self.full:
+        if self.full or self.was_started_again:
             return
         try:
             self._writer.write(key, raw, self._clock.now_s())

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.component.messages import AskStory, LogLevel, Story, StoryEvent
+from backbone.component.messages import AskStory, AskTime, LogLevel, MissionTime, Story, StoryEvent
 from backbone.keys import Conversation
 from backbone.recording.files import RecordingFiles
 from backbone.recording.known_messages import message_classes
@@ -153,6 +154,38 @@ def test_it_ends_when_the_mission_has_ended(tmp_path: Path, local_mission: Any) 
             await bus.close()
 
     run_virtual(play())
+
+
+def test_it_ends_when_a_later_mission_of_the_name_is_up(tmp_path: Path, local_mission: Any) -> None:
+    async def play() -> None:
+        clock = VirtualClock()
+        async with local_mission("local") as network:
+            bus, scout = network.join("backbone/recorder", clock), network.join("resource_pool/scout1", clock)
+            links: list[Any] = []
+            bus.watch_link = links.append
+            recorder = Recorder(bus, clock, files=RecordingFiles(tmp_path / "it.mcap"), classes=CLASSES, about={})
+            running = asyncio.create_task(recorder.run())
+            await clock.sleep_s(30.0)
+            scout.publish(scout.source, Conversation.LOG, event(1))
+            links[0](False)
+            await clock.sleep_s(3.0)
+
+            async def answer(_asked: object) -> MissionTime:
+                return MissionTime(clock.now_s() - 32.0, 1.0)
+
+            network.join(NAMESERVER, clock).serve(NAMESERVER, AskTime, answer)
+            links[0](True)
+            await clock.sleep_s(0.1)
+            scout.publish(scout.source, Conversation.LOG, event(2))
+            await clock.sleep_s(3.0)
+            assert running.done()
+            assert recorder.was_started_again
+            await bus.close()
+
+    run_virtual(play())
+    with (tmp_path / "it.mcap").open("rb") as file:
+        said = [one.body["what"] for one in Recording(file).messages() if one.source == "resource_pool/scout1"]
+    assert said == ["event 1"]
 
 
 @pytest.mark.parametrize(("split_s", "split_bytes"), [(2.0, 10**9), (1e6, 3_000)])
