@@ -12,6 +12,7 @@ from collections.abc import AsyncGenerator, AsyncIterator
 from typing import Protocol
 
 from backbone import run_files
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.command_line.connection import connected
@@ -20,6 +21,7 @@ from backbone.component.messages import Absence
 from backbone.creator.process_table import is_stopped
 from backbone.errors import HubUnreachable, LinkError
 from backbone.launcher.endings import ExitCode
+from backbone.naming import component_of
 from backbone.picture.health import HealthWord
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
@@ -65,7 +67,7 @@ async def show_status(where: Where, display: Display, *, watch: bool) -> ExitCod
         watch: Again and again, until Ctrl-C.
 
     Raises:
-        MissionNotUp: No mission of this name is up on this machine.
+        MissionNotUp: No mission of this name is up on this machine, or not any more.
         LinkError: The nameserver did not answer, and no launcher of the mission lives on this machine.
     """
     found = run_files.find(where.mission) if where.connect is None else None
@@ -92,7 +94,12 @@ async def _show(pictures: AsyncGenerator[MissionPicture, None], display: Display
 async def _pictures(
     bus: Bus, clock: Clock, found: run_files.RunFile | None, every_s: float
 ) -> AsyncGenerator[MissionPicture, None]:
-    """Yield the state of the mission, without end."""
+    """Yield the state of the mission, until it has ended.
+
+    Raises:
+        MissionNotUp: The mission has ended; a later one of its name may be up.
+        LinkError: The nameserver of a mission elsewhere did not answer.
+    """
     before = None
     while True:
         try:
@@ -101,8 +108,26 @@ async def _pictures(
             if found is None:
                 raise
             before = picture_without_hub(found, error)
+        if found is not None:
+            _require_same(found, before)
         yield before
         await clock.sleep_s(every_s * clock.rate)
+
+
+def _require_same(found: run_files.RunFile, picture: MissionPicture) -> None:
+    """Return if the mission of this picture is still up on this machine.
+
+    Raises:
+        MissionNotUp: Its nameserver does not answer and it has ended, or a later mission of its name is up, whose time
+            is another.
+    """
+    if any(absence.name == component_of(NAMESERVER) for absence in picture.missed):
+        run_files.find(found.mission)
+    origins = [one.clock_origin_monotonic_s for one in run_files.find_all() if one.mission == found.mission]
+    if any(origin != found.clock_origin_monotonic_s for origin in origins):
+        raise run_files.MissionNotUp(
+            f"{found.mission} was started again", remedy="Repeat the command for the new mission."
+        )
 
 
 def picture_without_hub(found: run_files.RunFile, error: LinkError) -> MissionPicture:
