@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import ClassVar, Generic, TypeVar
 
 import msgspec
@@ -25,6 +25,7 @@ from ui_console.session.feed import ConsoleFeed, FeedEvent
 from ui_console.session.lift_talk import LiftTalk
 from ui_console.session.map_feed import MapFeed
 
+T = TypeVar("T")
 P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
 
 
@@ -75,6 +76,7 @@ class Observer(Component[P_co], Generic[P_co]):
         """Its subscription to places; None: it shows no map."""
         self.answers = answers or ConsentAnswers(self.user, clock, self.show, self.acted)
         """The questions to its operator."""
+        self._stops: set[asyncio.Task[object]] = set()
         self._answers_of = answers_of or (lambda user: self.answers if user in (self.user, self.address) else None)
 
     # ------------------------------------------------------------------ the operator's actions
@@ -96,7 +98,7 @@ class Observer(Component[P_co], Generic[P_co]):
         """Stop a robot, regardless of its holder; return whether the stop is confirmed."""
         self.require_let_go()
         self.acted(OperatorAction.STOP_ROBOT, robot, reason, user)
-        return not await self.feed.stop_robots([robot], reason, user or self.user)
+        return not await self._carried_out(self.feed.stop_robots([robot], reason, user or self.user))
 
     async def stop_all(self, reason: str = "", user: str = "") -> list[str]:
         """Stop all robots of the mission, regardless of their holders; return the robots whose stop is not confirmed.
@@ -107,8 +109,7 @@ class Observer(Component[P_co], Generic[P_co]):
         known, user = self.feed.robots, user or self.user
         names = ", ".join(sorted(known)) or "all there are"
         self.acted(OperatorAction.STOP_ALL, "robots", f"{names}{f', {reason}' if reason else ''}", user)
-        unsure, found = await asyncio.gather(self.feed.stop_robots(known, reason, user), self.feed.find_robots())
-        return unsure + await self.feed.stop_robots(found - known, reason, user)
+        return await self._carried_out(self._stop_all(known, reason, user))
 
     async def lift_stop(
         self, robot: str, number: int, user: str = "", show: Callable[[ConsoleEvent], None] | None = None
@@ -168,7 +169,9 @@ class Observer(Component[P_co], Generic[P_co]):
                 return await super().answer(asked)
 
     async def drain(self) -> None:
-        """Publish that the operator left."""
+        """Wait until no emergency stop is under way; publish that the operator left."""
+        while self._stops:
+            await asyncio.gather(*self._stops)
         if self._signs_in:
             self.acted(OperatorAction.DETACH, self.name)
 
@@ -194,6 +197,17 @@ class Observer(Component[P_co], Generic[P_co]):
 
     def require_let_go(self) -> None:
         """Ignore held controls until they were released. When: before a stop, and when the hub does not answer."""
+
+    async def _stop_all(self, known: frozenset[str], reason: str, user: str) -> list[str]:
+        unsure, found = await asyncio.gather(self.feed.stop_robots(known, reason, user), self.feed.find_robots())
+        return unsure + await self.feed.stop_robots(found - known, reason, user)
+
+    async def _carried_out(self, stop: Coroutine[object, None, T]) -> T:
+        """Return the outcome of an emergency stop, which neither a cancellation nor the end of the console cuts off."""
+        task = asyncio.create_task(stop, name=f"{self.name}:emergency stop")
+        self._stops.add(task)
+        task.add_done_callback(self._stops.discard)
+        return await asyncio.shield(task)
 
     def _heard(self, event: FeedEvent) -> None:
         self.show(event)

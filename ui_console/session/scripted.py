@@ -46,6 +46,7 @@ class ScriptDriver:
         self._wrong: WrongScript | None = None
         self._console: Teleoperation | None = None
         self._stops: list[StopRobot | StopAll] = []
+        self._stopping: set[asyncio.Task[None]] = set()
         self._stopped = self._is_unanswered = self._order_is_over = False
         self._awaited = 0
 
@@ -121,9 +122,14 @@ class ScriptDriver:
             self._news.set()
 
     async def drive(self, console: Teleoperation) -> None:
-        """Wait for the grant, play the script to its end, give the robot back."""
+        """Wait for the grant, play the script to its end, give the robot back; then no stop is under way."""
         self._console = console
         self._begin_stops()
+        await self._play_when_granted(console)
+        while self._stopping:
+            await asyncio.wait(self._stopping)
+
+    async def _play_when_granted(self, console: Teleoperation) -> None:
         try:
             async with asyncio.timeout(self._within_s / console.clock.rate if self._within_s else None):
                 await console.wait_granted()
@@ -182,7 +188,9 @@ class ScriptDriver:
             return
         stops, self._stops = self._stops, []
         for stop in stops:
-            self._console.start_task(self._stop(self._console, stop), "stop")
+            task = self._console.start_task(self._stop(self._console, stop), "stop")
+            self._stopping.add(task)
+            task.add_done_callback(self._stopping.discard)
 
     async def _stop(self, console: Teleoperation, stop: StopRobot | StopAll) -> None:
         """Stop one robot or all; if a robot does not confirm its stop, the script shows that and fails."""

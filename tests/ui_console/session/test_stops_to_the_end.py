@@ -1,0 +1,107 @@
+"""A stop is carried out to its end, whatever ends the console meanwhile."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from contextlib import AsyncExitStack
+from typing import Any
+
+import pytest
+from fake_resource_pool import FakePlacer
+from held_robot import HeldRobot
+from stoppable_robot import StoppableRobot
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.interface import Clock
+from backbone.component.launch import Launch
+from backbone.naming import Subsystem
+from backbone.wire import Envelope, Message
+from ui_console.model.console import ConsoleModel
+from ui_console.session.observer import Observer
+from ui_console.session.scripted import ScriptDriver
+
+
+def joined(network: Any, clock: Clock, subsystem: Subsystem, name: str) -> tuple[Launch, Any, Clock]:
+    """Return what a component of this name begins with."""
+    launch = Launch(network.mission, subsystem, name, "x", "x:Y", "local", "", 0.0, 1.0)
+    return launch, network.join(launch.address, clock), clock
+
+
+class Stage:
+    """Two robots, and two people at consoles that know no robot yet."""
+
+    def __init__(self, network: Any) -> None:
+        self.network, self.clock = network, VirtualClock()
+        self.robots = [StoppableRobot(*self._joined(Subsystem.RESOURCE_POOL, name)) for name in ("scout1", "scout2")]
+        self.models = {name: ConsoleModel(name, name) for name in ("anna", "ben")}
+        self.consoles = {name: self.console(name) for name in self.models}
+
+    def console(self, name: str) -> Observer[Any]:
+        show = self.models[name].apply
+        return Observer(*self._joined(Subsystem.UI_CONSOLE, name), show=show, watches=False, user=name)
+
+    def _joined(self, subsystem: Subsystem, name: str) -> tuple[Launch, Any, Clock]:
+        return joined(self.network, self.clock, subsystem, name)
+
+
+Scene = Callable[[Stage], Awaitable[None]]
+
+
+@pytest.fixture
+def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
+    def run(scene: Scene) -> None:
+        async def main() -> None:
+            async with local_mission("iros2001") as network, AsyncExitStack() as stack:
+                on = Stage(network)
+                for one in (*on.robots, *on.consoles.values()):
+                    await stack.enter_async_context(beside(one))
+                await scene(on)
+
+        run_virtual(main())
+
+    return run
+
+
+def test_a_stop_of_all_is_carried_out_before_a_console_that_must_end_leaves(stage: Callable[[Scene], None]) -> None:
+    """As when a terminal is closed, or a signal comes, right after the key."""
+
+    async def scene(on: Stage) -> None:
+        stopping = asyncio.create_task(on.consoles["anna"].stop_all())
+        await asyncio.sleep(0)
+        on.consoles["anna"].end("SIGTERM")
+        assert await stopping == []
+        assert [robot.latch.state.is_stopped for robot in on.robots] == [True, True]
+
+    stage(scene)
+
+
+class SilentRobot(StoppableRobot):
+    """Hangs: its answer comes too late."""
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        await self.clock.sleep_s(60.0)
+        return await super().answer(asked)
+
+
+def test_a_script_waits_for_the_outcome_of_its_stops(local_mission: Any, beside: Any) -> None:
+    async def main() -> None:
+        async with local_mission("iros2001") as network:
+            placer = FakePlacer(network, VirtualClock(), {})
+            on = HeldRobot(placer, is_scripted=True)
+            said: list[bytes] = []
+            driver = ScriptDriver(said.append)
+            on.make_console(show=driver.show, work=driver.drive)
+            async with beside(SilentRobot(*joined(network, on.clock, Subsystem.RESOURCE_POOL, "scout9"))):
+                living = asyncio.create_task(on.console.run())
+                await on.held()
+                for line in ('{"stop_robot":"scout9"}', None):
+                    driver.feed(line)
+                await living
+            await on.rc.close()
+            await placer.close()
+            assert driver.exit_code(on.console) == 5
+            assert any("scout9 did not confirm the stop" in json.loads(line).get("detail", "") for line in said)
+
+    run_virtual(main())
