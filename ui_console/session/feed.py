@@ -120,10 +120,10 @@ class ConsoleFeed:
         """All robots known so far."""
         return frozenset(self._robots)
 
-    async def find_robots(self) -> frozenset[str]:
-        """Return all robots of the mission, including robots not known so far."""
+    async def find_robots(self) -> frozenset[str] | None:
+        """Return all robots of the mission, also those not known so far; None: the nameserver did not answer."""
         pool = await self._list_of(Subsystem.RESOURCE_POOL)
-        return self.robots | {component_of(one.address) for one in pool if one.is_robot}
+        return None if pool is None else self.robots | {component_of(one.address) for one in pool if one.is_robot}
 
     async def ask_stop(self, robot: str) -> StopState | None:
         """Return the state of the robot's stop; None: its RC did not answer."""
@@ -133,9 +133,10 @@ class ConsoleFeed:
             return stop
         return None
 
-    async def consoles(self) -> list[str]:
-        """Return the addresses of all consoles of the mission; empty if the nameserver did not answer."""
-        return [one.address for one in await self._list_of(Subsystem.UI_CONSOLE)]
+    async def consoles(self) -> list[str] | None:
+        """Return the addresses of all consoles of the mission; None: the nameserver did not answer."""
+        listed = await self._list_of(Subsystem.UI_CONSOLE)
+        return None if listed is None else [one.address for one in listed]
 
     async def lift(self, stop: StopState, user: str = "") -> bool:
         """Lift the stop of a robot; return whether the robot may move."""
@@ -202,12 +203,12 @@ class ConsoleFeed:
         resolved = await self._bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)
         return resolved.component.address
 
-    async def _list_of(self, subsystem: Subsystem) -> list[ComponentState]:
-        """Return the components of a subsystem; none if the nameserver did not answer."""
+    async def _list_of(self, subsystem: Subsystem) -> list[ComponentState] | None:
+        """Return the components of a subsystem; None: the nameserver did not answer."""
         with self._showing_failure():
             question = ListComponents(subsystem=str(subsystem))
             return (await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)).components
-        return []
+        return None
 
     async def _list_when_due(self) -> None:
         self._listing.set()

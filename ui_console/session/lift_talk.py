@@ -98,7 +98,10 @@ class LiftTalk:
         question = AskLift(robot, author.by, author.console, self._user)
         answers = [await self._ask_at(author.console, question)]
         if not answers[0].is_here:
-            others = [at for at in await self._console.feed.consoles() if at != author.console]
+            consoles = await self._console.feed.consoles()
+            if consoles is None:
+                answers.append(Consent(False, author.by, "may be at another console; the nameserver does not answer"))
+            others = [at for at in consoles or [] if at != author.console]
             answers += await asyncio.gather(*(self._ask_at(at, question) for at in others))
         consent, now_s = answer_of(author, answers), self._console.clock.now_s()
         self._show(ConsentHeard(now_s, robot, author_name(author), consent.is_given, consent.reason, Topic.LIFT))

@@ -28,6 +28,9 @@ from ui_console.session.map_feed import MapFeed
 T = TypeVar("T")
 P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
 
+UNLISTED = "robots that this console does not know"
+"""Named beside robots whose stop is not confirmed, if the nameserver did not list the mission's robots."""
+
 
 def no_person_here(_user: str) -> ConsentAnswers | None:
     """Return None, because a console that only a program reads has no person to ask."""
@@ -103,7 +106,8 @@ class Observer(Component[P_co], Generic[P_co]):
     async def stop_all(self, reason: str = "", user: str = "") -> list[str]:
         """Stop all robots of the mission, regardless of their holders; return the robots whose stop is not confirmed.
 
-        Known robots are stopped at once, before the nameserver is asked for further ones.
+        Known robots are stopped at once, before the nameserver is asked for further ones. If it does not answer, the
+        result names ``UNLISTED`` too.
         """
         self.require_let_go()
         known, user = self.feed.robots, user or self.user
@@ -200,6 +204,8 @@ class Observer(Component[P_co], Generic[P_co]):
 
     async def _stop_all(self, known: frozenset[str], reason: str, user: str) -> list[str]:
         unsure, found = await asyncio.gather(self.feed.stop_robots(known, reason, user), self.feed.find_robots())
+        if found is None:
+            return [*unsure, UNLISTED]
         return unsure + await self.feed.stop_robots(found - known, reason, user)
 
     async def _carried_out(self, stop: Coroutine[object, None, T]) -> T:

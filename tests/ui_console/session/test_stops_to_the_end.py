@@ -1,4 +1,4 @@
-"""A stop is carried out to its end, whatever ends the console meanwhile."""
+"""A stop is carried out to its end, whatever ends the console meanwhile, and no robot counts as stopped for nothing."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from fake_resource_pool import FakePlacer
 from held_robot import HeldRobot
 from stoppable_robot import StoppableRobot
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Clock
 from backbone.component.launch import Launch
@@ -73,6 +74,33 @@ def test_a_stop_of_all_is_carried_out_before_a_console_that_must_end_leaves(stag
         on.consoles["anna"].end("SIGTERM")
         assert await stopping == []
         assert [robot.latch.state.is_stopped for robot in on.robots] == [True, True]
+
+    stage(scene)
+
+
+def test_a_stop_of_all_is_not_sure_without_a_list_of_all(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        away = on.network.servers.pop(NAMESERVER)
+        assert await on.consoles["anna"].stop_all()
+        on.network.servers[NAMESERVER] = away
+        assert await on.consoles["anna"].stop_all() == []
+
+    stage(scene)
+
+
+def test_a_stop_is_not_lifted_while_nobody_knows_where_its_author_is(stage: Callable[[Scene], None]) -> None:
+    """The author is at another screen by now, and the nameserver, which lists the screens, is away for a moment."""
+
+    async def scene(on: Stage) -> None:
+        robot = on.robots[0]
+        await on.consoles["anna"].stop_robot("scout1")
+        on.consoles["anna"].end("goes to another room")
+        await on.clock.sleep_s(0.1)
+        away = on.network.servers.pop(NAMESERVER)
+        assert not await on.consoles["ben"].lift_stop("scout1", robot.latch.state.number)
+        assert robot.latch.state.is_stopped
+        on.network.servers[NAMESERVER] = away
+        assert await on.consoles["ben"].lift_stop("scout1", robot.latch.state.number)
 
     stage(scene)
 
