@@ -256,6 +256,8 @@ class RobotRc(ResourceController[P], Generic[P]):
             else:
                 self._latch.confirm(True)
                 self._tell_halted(holder)
+        else:
+            self._latch.confirm(True)  # a former holder's last packet was a safe one, or its radio sends no more
         self._publish_stop()
         if is_new:
             self.publish_event(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")

@@ -18,7 +18,7 @@ from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
 from backbone.ranges import LONGEST_LEASE_S
-from backbone.rc_manager.messages import Connect, Connected
+from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected
 from backbone.scheduling.requests import RcUse, Usage
 from resource_pool.arc_client import EmergencyStopped, StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.commands import Drive, Jump
@@ -350,3 +350,21 @@ async def late(pool: Pool, on_the_way_s: float, voice: Bus, what: Drive | Jump) 
     """A command that takes its time on the way."""
     await pool.clock.sleep_s(on_the_way_s)
     return await command(voice, what)
+
+
+def test_a_stop_that_is_pressed_again_when_no_holder_is_left_is_confirmed(local_mission: Any) -> None:
+    """As when the radio was lost: first the stop is not sure, then the RC manager ends the grant."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, RCS, manager=False) as pool, held_by_hand(pool) as voice:
+            operator = pool.voice_of(OPERATOR)
+            await command(voice, Drive(4.0, 4.0))
+            await pool.kill("radio")
+            assert not (await stop_robot(operator, "scout1", "")).is_confirmed
+            assert not (await stop_robot(operator, "scout1", "")).is_confirmed
+            over = Disconnect("one", 5, "its radio is gone")
+            await pool.manager_voice.ask("resource_pool/scout1", over, Disconnected, within_s=5)
+            again = await stop_robot(operator, "scout1", "")
+            assert (again.is_stopped, again.number, again.is_confirmed) == (True, 3, True)
+
+    run_virtual(main())
