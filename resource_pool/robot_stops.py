@@ -7,9 +7,11 @@ from collections.abc import Callable
 from backbone.bus.interface import Bus, Subscription
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
+from backbone.printable_text import printable
 from backbone.wire import Message
 from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop, StopState
 
+MOST_REASON_CHARACTERS = 400  # chosen: a person reads no more, and their longest escapes fit ``ranges.Line``
 REPLY_TIME_S = 1.0  # chosen: after a longer wait an operator has reason to press the emergency stop
 
 
@@ -17,12 +19,13 @@ async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopS
     """Stop a robot, even if an ARC holds it; nothing moves it until ``lift_stop``, and the holder keeps its grant.
 
     A stop needs neither grant nor ARC nor RC manager; a second stop keeps the first one's author. For operators only.
+    The reason is made one printable line of bounded length, because no reason may prevent a stop.
 
     Raises:
         NotFromYou: The component of ``bus`` is no operator.
         LinkError: The robot's RC did not answer; the outcome is unknown.
     """
-    return await _ask_robot(bus, robot, EmergencyStop(reason, user))
+    return await _ask_robot(bus, robot, EmergencyStop(printable(reason, MOST_REASON_CHARACTERS), user))
 
 
 async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:

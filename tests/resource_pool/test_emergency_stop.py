@@ -13,18 +13,21 @@ from typing import Any
 import pytest
 from pool_on_local_network import HARDWARE, Pool, a_pool
 
-from backbone.bus.clock import run_virtual
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.inbox import reader_of
 from backbone.bus.interface import Bus
+from backbone.bus.local_bus import LocalNetwork
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
 from backbone.ranges import LONGEST_LEASE_S
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected
 from backbone.scheduling.requests import RcUse, Usage
+from backbone.wire import Envelope, Message, write
 from resource_pool.arc_client import EmergencyStopped, StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.commands import Drive, Jump
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, LoadPacket, NotFromYou, NoTurnSoon, PacketLoaded
 from resource_pool.rcs.scout import Scout
-from resource_pool.stop_messages import GivenBeforeStop, OtherStop
+from resource_pool.stop_messages import EmergencyStop, GivenBeforeStop, OtherStop
 from scout_model.radio_link import encode_drive, encode_halt, encode_jump, encode_transmitter_on
 
 RCS = ["scout1", "scout2", "radio"]
@@ -350,6 +353,30 @@ async def late(pool: Pool, on_the_way_s: float, voice: Bus, what: Drive | Jump) 
     """A command that takes its time on the way."""
     await pool.clock.sleep_s(on_the_way_s)
     return await command(voice, what)
+
+
+# ---------------------------------------------------------------------- whatever is said, and said again
+LONG = {"a report": "x" * 5_000, "controls": "\U000e0001" * 5_000, "no UTF-8": "a file \udcff", "usual": "a child"}
+
+
+@pytest.mark.parametrize("reason", LONG.values(), ids=LONG)
+def test_a_stop_is_carried_out_whatever_its_reason_is(reason: str) -> None:
+    async def main() -> None:
+        network, clock = LocalNetwork(), VirtualClock()
+        robot, operator = network.join("resource_pool/scout1", clock), network.join(OPERATOR, clock)
+
+        async def answer(asked: Envelope[Any]) -> Message:
+            read = reader_of(EmergencyStop).read(write(asked)).body
+            return StopState("scout1", True, 1, "anna", read.reason, 0.0)
+
+        robot.serve("resource_pool/scout1", EmergencyStop, answer)
+        state = await stop_robot(operator, "scout1", reason, "anna")
+        assert state.is_stopped
+        assert state.reason[:3] == reason[:3] or not reason.isprintable()
+        await robot.close()
+        await operator.close()
+
+    run_virtual(main())
 
 
 def test_a_stop_that_is_pressed_again_when_no_holder_is_left_is_confirmed(local_mission: Any) -> None:
