@@ -80,6 +80,7 @@ class ConsoleFeed:
         self._hosts: dict[str, list[Subscription]] = {}
         self._radios: set[str] = set()
         self._robots: set[str] = set()
+        self._scheduled: set[str] | None = None
         self._listing, self._types_due = asyncio.Event(), asyncio.Event()
         self.listed = asyncio.Event()
         """Set when every component has answered the first questions or timed out."""
@@ -117,7 +118,7 @@ class ConsoleFeed:
 
     @property
     def robots(self) -> frozenset[str]:
-        """All robots known so far."""
+        """All known robots: those in the schedule, also if their RCs are down, and those that are there."""
         return frozenset(self._robots)
 
     async def find_robots(self) -> frozenset[str] | None:
@@ -321,7 +322,12 @@ class ConsoleFeed:
                     self._meet(component)
             case Schedule():
                 self._radios = {rc.rc for rc in said.rcs if rc.sharable and rc.state != "down"}
-                self._robots |= {rc.rc for rc in said.rcs if rc.is_robot}
+                scheduled = {rc.rc for rc in said.rcs if rc.is_robot}
+                self._robots = (self._robots - ((self._scheduled or set()) - scheduled)) | scheduled
+                self._scheduled = scheduled
+            case Disappeared(address=gone):  # a robot that crashed remains in the schedule, a removed one does not
+                if self._scheduled is not None and component_of(gone) not in self._scheduled:
+                    self._robots.discard(component_of(gone))
         self._show(Heard(self._clock.now_s(), said, source))
 
     def _meet(self, component: ComponentState) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 from typing import Any
 
+import msgspec
 import pytest
 from console_scenes import SCHEDULE
 
@@ -263,6 +264,23 @@ def test_all_robots_are_stopped_also_those_not_heard_of_and_a_silent_one_is_name
             assert await console.lift_stop("scout1", one.latch.state.number)
             assert on.model.team.robots.stop_of("scout1") is None
             assert not one.latch.state.is_stopped
+
+    stage(scene)
+
+
+def test_a_robot_that_was_removed_is_not_told_to_stop_and_one_that_crashed_is(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        console, manager = on.observer(), on.manager()
+        async with on.beside(manager), on.beside(console):
+            async with on.beside(on.robot("scout1")), on.beside(on.robot("scout2")), on.beside(on.robot("scout9")):
+                await on.until(lambda: "schedule" in on.words() and console.feed.robots >= {"scout1", "scout9"})
+                assert await console.stop_all() == []
+                left = msgspec.structs.replace(SCHEDULE, rcs=[rc for rc in SCHEDULE.rcs if rc.rc != "scout1"])
+                manager.bus.publish(manager.address, Conversation.SCHEDULE, left)
+                await on.clock.sleep_s(0.1)
+                assert await console.stop_all() == [], "it still answers"
+            await on.clock.sleep_s(0.1)
+            assert await console.stop_all() == ["scout2"]
 
     stage(scene)
 
