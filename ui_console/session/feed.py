@@ -194,10 +194,11 @@ class ConsoleFeed:
     async def _stop(self, robot: str, reason: str, user: str) -> bool:
         with self._showing_failure():
             try:
-                self._hear(await stop_robot(self._bus, robot, reason, user))
+                stop = await stop_robot(self._bus, robot, reason, user)
             except LinkError as error:
                 raise LinkError(f"{robot} did not confirm the stop: {error}") from error
-            return True
+            self._hear(stop)
+            return stop.is_stopped and stop.is_confirmed  # it may be lifted already, or its radio was silent
         return False
 
     async def _resolve(self, name: str) -> str:

@@ -19,6 +19,7 @@ from backbone.bus.interface import Clock
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
 from backbone.wire import Envelope, Message
+from resource_pool.stop_latch import StopLatch
 from ui_console.model.console import ConsoleModel
 from ui_console.session.observer import Observer
 from ui_console.session.scripted import ScriptDriver
@@ -84,6 +85,26 @@ def test_a_stop_of_all_is_not_sure_without_a_list_of_all(stage: Callable[[Scene]
         assert await on.consoles["anna"].stop_all()
         on.network.servers[NAMESERVER] = away
         assert await on.consoles["anna"].stop_all() == []
+
+    stage(scene)
+
+
+@pytest.mark.parametrize("is_lifted", [True, False], ids=["lifted meanwhile", "radio lost"])
+def test_a_stop_that_is_answered_and_did_not_stop_the_wheels_is_not_confirmed(
+    stage: Callable[[Scene], None], monkeypatch: pytest.MonkeyPatch, is_lifted: bool
+) -> None:
+    async def scene(on: Stage) -> None:
+        latch, ben = on.robots[0].latch, on.consoles["ben"]
+
+        def stop(*given: Any) -> None:
+            StopLatch.stop(latch, *given)
+            latch.confirm(False)
+            if is_lifted:
+                latch.lift(latch.state.number, "anna", 0.0)
+
+        monkeypatch.setattr(latch, "stop", stop)
+        assert not await ben.stop_robot("scout1")
+        assert await ben.stop_all() == ["scout1"]
 
     stage(scene)
 
