@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from backbone.bus.interface import Bus, Subscription
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.asking import ask_until_answered
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.printable_text import printable
@@ -15,17 +16,28 @@ MOST_REASON_CHARACTERS = 400  # chosen: a person reads no more, and their longes
 REPLY_TIME_S = 1.0  # chosen: after a longer wait an operator has reason to press the emergency stop
 
 
-async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopState:
+async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "", clock: Clock | None = None) -> StopState:
     """Stop a robot, even if an ARC holds it; nothing moves it until ``lift_stop``, and the holder keeps its grant.
 
     A stop needs neither grant nor ARC nor RC manager; a second stop keeps the first one's author. For operators only.
     The reason is made one printable line of bounded length, because no reason may prevent a stop.
 
+    Args:
+        bus: Bus of an operator.
+        robot: The robot.
+        reason: For people.
+        user: Name of the operator, for people.
+        clock: The mission's clock, to repeat the stop for ``REPLY_TIME_S`` while no component answers, because the hub
+            or the robot's RC may be restarting; None: do not repeat it.
+
     Raises:
         NotFromYou: The component of ``bus`` is no operator.
         LinkError: The robot's RC did not answer; the outcome is unknown.
     """
-    return await _ask_robot(bus, robot, EmergencyStop(printable(reason, MOST_REASON_CHARACTERS), user))
+    stop, at = EmergencyStop(printable(reason, MOST_REASON_CHARACTERS), user), address(Subsystem.RESOURCE_POOL, robot)
+    if clock is None:
+        return await bus.ask(at, stop, StopState, within_s=REPLY_TIME_S)
+    return await ask_until_answered(bus, clock, at, stop, StopState, each_s=REPLY_TIME_S, within_s=REPLY_TIME_S)
 
 
 async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:

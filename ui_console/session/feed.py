@@ -15,6 +15,7 @@ from types import TracebackType
 
 from backbone.addresses import COMPONENT_DATABASE, LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.asking import ask_until_answered
 from backbone.component.messages import (
     AskParameters,
     AskStatistics,
@@ -123,7 +124,7 @@ class ConsoleFeed:
 
     async def find_robots(self) -> frozenset[str] | None:
         """Return all robots of the mission, also those not known so far; None: the nameserver did not answer."""
-        pool = await self._list_of(Subsystem.RESOURCE_POOL)
+        pool = await self._list_of(Subsystem.RESOURCE_POOL, again_within_s=REPLY_TIME_S)
         return None if pool is None else self.robots | {component_of(one.address) for one in pool if one.is_robot}
 
     async def ask_stop(self, robot: str) -> StopState | None:
@@ -194,7 +195,7 @@ class ConsoleFeed:
     async def _stop(self, robot: str, reason: str, user: str) -> bool:
         with self._showing_failure():
             try:
-                stop = await stop_robot(self._bus, robot, reason, user)
+                stop = await stop_robot(self._bus, robot, reason, user, self._clock)
             except LinkError as error:
                 raise LinkError(f"{robot} did not confirm the stop: {error}") from error
             self._hear(stop)
@@ -205,11 +206,14 @@ class ConsoleFeed:
         resolved = await self._bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)
         return resolved.component.address
 
-    async def _list_of(self, subsystem: Subsystem) -> list[ComponentState] | None:
-        """Return the components of a subsystem; None: the nameserver did not answer."""
+    async def _list_of(self, subsystem: Subsystem, again_within_s: float = 0.0) -> list[ComponentState] | None:
+        """Return the components of a subsystem; None: the nameserver did not answer, also when asked again."""
         with self._showing_failure():
-            question = ListComponents(subsystem=str(subsystem))
-            return (await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)).components
+            question, bus, clock = ListComponents(subsystem=str(subsystem)), self._bus, self._clock
+            listing = await ask_until_answered(
+                bus, clock, NAMESERVER, question, Components, each_s=REPLY_TIME_S, within_s=again_within_s
+            )
+            return listing.components
         return None
 
     async def _list_when_due(self) -> None:

@@ -203,10 +203,13 @@ class Observer(Component[P_co], Generic[P_co]):
         """Ignore held controls until they were released. When: before a stop, and when the hub does not answer."""
 
     async def _stop_all(self, known: frozenset[str], reason: str, user: str) -> list[str]:
-        unsure, found = await asyncio.gather(self.feed.stop_robots(known, reason, user), self.feed.find_robots())
-        if found is None:
-            return [*unsure, UNLISTED]
-        return unsure + await self.feed.stop_robots(found - known, reason, user)
+        stopping = self.feed.stop_robots(known, reason, user), self._stop_others(known, reason, user)
+        unsure, unsure_others = await asyncio.gather(*stopping)
+        return unsure + unsure_others
+
+    async def _stop_others(self, known: frozenset[str], reason: str, user: str) -> list[str]:
+        found = await self.feed.find_robots()
+        return [UNLISTED] if found is None else await self.feed.stop_robots(found - known, reason, user)
 
     async def _carried_out(self, stop: Coroutine[object, None, T]) -> T:
         """Return the outcome of an emergency stop, which neither a cancellation nor the end of the console cuts off."""

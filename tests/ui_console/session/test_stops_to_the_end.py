@@ -79,6 +79,36 @@ def test_a_stop_of_all_is_carried_out_before_a_console_that_must_end_leaves(stag
     stage(scene)
 
 
+@pytest.mark.parametrize("restarts", ["resource_pool/scout1", NAMESERVER])
+def test_a_stop_outlasts_a_restart_of_the_robots_rc_and_of_the_nameserver(
+    stage: Callable[[Scene], None], restarts: str
+) -> None:
+    async def scene(on: Stage) -> None:
+        away = on.network.servers.pop(restarts)
+        stopping = asyncio.create_task(on.consoles["anna"].stop_all())
+        await on.clock.sleep_s(0.3)
+        on.network.servers[restarts] = away
+        assert await stopping == []
+        assert [robot.latch.state.is_stopped for robot in on.robots] == [True, True]
+
+    stage(scene)
+
+
+def test_a_known_robot_that_hangs_does_not_delay_the_stop_of_an_unknown_one(
+    stage: Callable[[Scene], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scene(on: Stage) -> None:
+        anna, (one, other) = on.consoles["anna"], on.robots
+        monkeypatch.setattr(anna.feed, "_robots", {"scout1"})
+        monkeypatch.setattr(one, "answer", lambda _asked: on.clock.sleep_s(60.0))
+        stopping = asyncio.create_task(anna.stop_all())
+        await on.clock.sleep_s(0.1)
+        assert other.latch.state.is_stopped
+        assert await stopping == ["scout1"]
+
+    stage(scene)
+
+
 def test_a_stop_of_all_is_not_sure_without_a_list_of_all(stage: Callable[[Scene], None]) -> None:
     async def scene(on: Stage) -> None:
         away = on.network.servers.pop(NAMESERVER)
