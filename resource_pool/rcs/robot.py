@@ -303,6 +303,7 @@ class RobotRc(ResourceController[P], Generic[P]):
             self._halt_at_s = None
 
     async def _move(self, hold: Hold, order: Command, packet: bytes, **how: Any) -> None:
+        self.permit(order)  # again, because ``obey`` may have waited since
         try:
             await self._load(hold, packet, moves=True, **how)
         except GivenBeforeStop:
