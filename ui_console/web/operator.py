@@ -107,7 +107,7 @@ class Operator:
         self._ordering = Ordering(services.team)
         self._latency_s: dict[str, float] = {}
         self._work: dict[bytes, asyncio.Task[None]] = {}
-        self._stops: dict[bytes, asyncio.Task[None]] = {}
+        self._stops: set[asyncio.Task[None]] = set()
 
     # ------------------------------------------------------------------ messages of the browser
     def obey(self, intent: protocol.Intent) -> None:
@@ -147,15 +147,10 @@ class Operator:
             case protocol.DismissLost():
                 self.model.dismiss_lost()
                 self.refresh(self._services.clock.now_s())
-            case (
-                protocol.TakeOver()
-                | protocol.ReleaseRequest()
-                | protocol.EndOrders()
-                | protocol.StopRequest()
-                | protocol.StopAllRequest()
-                | protocol.LiftRequest()
-            ):
+            case protocol.TakeOver() | protocol.ReleaseRequest() | protocol.EndOrders() | protocol.LiftRequest():
                 self._begin(intent)
+            case protocol.StopRequest() | protocol.StopAllRequest():
+                self._begin_stop(intent)
             case protocol.WhyRequest() | protocol.ParametersRequest() | protocol.SetRequest() | protocol.SearchLog():
                 self._begin(intent)
             case _:
@@ -170,7 +165,7 @@ class Operator:
 
         Emergency stops are carried out to their end, because their operator expects robots to stand.
         """
-        stops, work = list(self._stops.values()), list(self._work.values())
+        stops, work = list(self._stops), list(self._work.values())
         for task in work:
             task.cancel()
         if work:
@@ -290,15 +285,20 @@ class Operator:
 
     def _begin(self, intent: AtWork) -> None:
         same = msgspec.json.encode(intent)
-        work = self._stops if isinstance(intent, Stop) else self._work
-        if same in work:
+        if same in self._work:
             return
         if isinstance(intent, Asked) and len(self._work) >= MOST_ASKED:
             self._answer({"refused": "too much is being asked at once; wait for the answers"})
             return
         task = asyncio.create_task(self._do(intent), name=f"{self.welcome.user}:{type(intent).__name__}")
-        work[same] = task
-        task.add_done_callback(lambda done: self._done(work, same, done))
+        self._work[same] = task
+        task.add_done_callback(lambda done: self._done(done, same))
+
+    def _begin_stop(self, intent: Stop) -> None:
+        """Begin an emergency stop; every press counts, because an earlier stop at work may be lifted already."""
+        task = asyncio.create_task(self._do(intent), name=f"{self.welcome.user}:{type(intent).__name__}")
+        self._stops.add(task)
+        task.add_done_callback(self._done)
 
     async def _do(self, intent: AtWork) -> None:
         observer, user = self._services.observer, self.welcome.user
@@ -377,8 +377,9 @@ class Operator:
     def _show_failed(self, error: Refusal | LinkError) -> None:
         self.show(failed(self._services.clock.now_s(), error))
 
-    def _done(self, work: dict[bytes, asyncio.Task[None]], same: bytes, task: asyncio.Task[None]) -> None:
-        work.pop(same, None)
+    def _done(self, task: asyncio.Task[None], same: bytes = b"") -> None:
+        self._work.pop(same, None)
+        self._stops.discard(task)
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._services.observer.fail(bug)
 

@@ -14,6 +14,8 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
+from backbone.wire import Envelope, Message
+from resource_pool.stop_messages import EmergencyStop
 from ui_console.model.consent import CONSENT_WITHIN_S
 from ui_console.model.console import ConsoleModel
 from ui_console.model.views import AlarmKind, AlarmView
@@ -21,7 +23,7 @@ from ui_console.session.observer import Observer
 from ui_console.web.hub import WebHub
 from ui_console.web.login import Welcome
 from ui_console.web.operator import Operator
-from ui_console.web.protocol import Decide, LiftRequest
+from ui_console.web.protocol import Decide, LiftRequest, StopAllRequest, StopRequest
 
 WITHIN_S = 5.0
 
@@ -148,6 +150,34 @@ def test_a_yes_that_comes_too_late_does_not_answer_the_next_question(stage: Call
         assert anna.outbox.next(0.0) == '{"answer":{"refused":"no answer was given: that question is over"}}'
         await on.clock.sleep_s(1.0)
         assert on.robot.latch.state.is_stopped
+
+    stage(scene)
+
+
+@pytest.mark.parametrize("stop", [StopRequest("scout1"), StopAllRequest()], ids=["one", "all"])
+def test_a_press_of_stop_counts_also_while_the_answer_to_an_earlier_one_is_awaited(
+    stage: Callable[[Scene], None], monkeypatch: pytest.MonkeyPatch, stop: StopRequest | StopAllRequest
+) -> None:
+    """The earlier stop was lifted meanwhile, while the robot's answer, or that of another robot, takes its time."""
+
+    async def scene(on: Stage) -> None:
+        answer, latch = on.robot.answer, on.robot.latch
+
+        async def answer_late(asked: Envelope[Any]) -> Message:
+            done = await answer(asked)
+            await on.clock.sleep_s(0.9 if isinstance(asked.body, EmergencyStop) else 0.0)
+            return done
+
+        monkeypatch.setattr(on.robot, "answer", answer_late)
+        anna = on.hub.enter(Welcome("anna", 100))
+        await on.until(lambda: "scout1" in on.hub.team.robots.names())
+        anna.obey(stop)
+        await on.until(lambda: latch.state.is_stopped)
+        latch.lift(latch.state.number, "anna", on.clock.now_s())
+        anna.obey(stop)
+        await on.clock.sleep_s(0.1)
+        assert latch.state.is_stopped
+        await on.hub.leave(anna, "closed the page")
 
     stage(scene)
 
