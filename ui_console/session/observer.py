@@ -175,7 +175,7 @@ class Observer(Component[P_co], Generic[P_co]):
     async def drain(self) -> None:
         """Wait until no emergency stop is under way; publish that the operator left."""
         while self._stops:
-            await asyncio.gather(*self._stops)
+            await asyncio.wait(self._stops)  # its exceptions are for who gave the stop
         if self._signs_in:
             self.acted(OperatorAction.DETACH, self.name)
 
