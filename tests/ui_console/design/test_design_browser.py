@@ -21,6 +21,25 @@ from ui_console.design.keeping import path_of_draft
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
+PRESS_AFTER_DRAG = """(handle) => {
+  const heard = [];
+  const fire = (target, kind, x, y) =>
+    target.dispatchEvent(new PointerEvent(kind, {
+      bubbles: true, pointerId: 7, pointerType: "touch", isPrimary: true, clientX: x, clientY: y,
+    }));
+  fire(handle, "pointerdown", 50, 50);
+  fire(handle, "pointermove", 0, 0);
+  if (document.querySelector(".ghost")) heard.push("drag");
+  fire(handle, "pointerup", 0, 0);
+  const tree = document.getElementById("tree");
+  tree.addEventListener("click", () => heard.push("press"), { once: true });
+  fire(tree, "pointerdown", 0, 0);
+  fire(tree, "pointerup", 0, 0);
+  tree.click();
+  return heard;
+}"""
+"""All in one task of the page, as on a busy device: no timer is served between the drag and the press."""
+
 
 @asynccontextmanager
 async def page_at(size: str, address: str, theme: str = "dark") -> AsyncIterator[Any]:
@@ -100,6 +119,13 @@ async def test_with_a_finger_on_a_phone_the_same_is_built(tmp_path: Path) -> Non
                 "() => [...document.querySelectorAll('.element.tag-behavior')].at(-1).ariaLevel === '4'"
             )
             await finger.is_state("saved, fine")
+
+
+async def test_the_click_of_a_press_right_after_a_drag_counts(tmp_path: Path) -> None:
+    with served(tmp_path / "guard.xml") as address:
+        async with page_at("tablet", address) as page:
+            handle = Mouse(page).part("behavior patrol").locator(".handle")
+            assert await handle.evaluate(PRESS_AFTER_DRAG) == ["drag", "press"]
 
 
 @pytest.mark.thorough

@@ -52,6 +52,7 @@ export class Drag {
 
   /** @param {PointerEvent} event */
   down(event) {
+    removeEventListener("click", stopClick, { capture: true }); // the click of this press is none of the last drag
     if (this.held || !event.isPrimary || (event.pointerType === "mouse" && event.button !== 0)) return;
     const source = around(event, "[data-drag]");
     if (!source || around(event, "button, input, select")) return;
