@@ -69,7 +69,7 @@ def bug_of(task: asyncio.Task[Any]) -> BaseException | None:
 async def only_bugs(work: Awaitable[T], name: str = "") -> T:
     """Return the result of the work, or raise what it raises as an ``Exception``; only what is ``PASSING`` passes.
 
-    Nobody handles the others: a ``SystemExit`` would end the event loop, for all components of the process, and an
+    No caller handles the others: a ``SystemExit`` would end the event loop, for all components of the process, and an
     exception of a library in another language would end the component without a drain.
 
     Args:

@@ -37,7 +37,7 @@ class OrdersInProgress:
         try:
             return await work
         except asyncio.CancelledError:
-            if task not in self._cut or task.uncancel():  # somebody else ends the task
+            if task not in self._cut or task.uncancel():  # another caller cancelled the task, too
                 raise
             raise StaleEpoch(
                 f"{hold.arc} lost {self._rc} before its command was carried out", epoch=hold.epoch

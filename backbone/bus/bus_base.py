@@ -80,7 +80,7 @@ class BusBase(ABC):
         token = current_cause.set(cause)
         try:
             act(*arguments)
-        except asyncio.CancelledError:  # as of the result of a cancelled task; nobody can cancel a callback
+        except asyncio.CancelledError:  # of a cancelled task, whose result it took; a callback cannot be cancelled
             self.on_bug(RuntimeError(f"a callback of {self.source} raised CancelledError"))
         except PASSING:
             raise

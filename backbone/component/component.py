@@ -45,9 +45,7 @@ from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
 
-DRAIN_WITHIN_S = (
-    10.0  # chosen: ten times the longest drain of a component without processes of its own; machine seconds
-)
+DRAIN_WITHIN_S = 10.0  # chosen: ten times the longest drain of a component without processes; machine seconds
 CALM_S = 0.02  # chosen: longer than a context switch, which must not wait for published news; people see no difference
 
 

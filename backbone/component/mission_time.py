@@ -8,7 +8,7 @@ from backbone.component.messages import AskTime, MissionTime
 from backbone.errors import LinkError, Refusal
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
-INEXACT_S = 1.0  # half of ``REPLY_TIME_S``: by so much a clock of another machine may be wrong from the start
+INEXACT_S = REPLY_TIME_S / 2  # by so much a clock of another machine may be wrong from the start
 DRIFT = 1e-4  # chosen: twice the drift of a machine's usual quartz, 50 ppm
 
 

@@ -312,7 +312,7 @@ class ProcessKeeper:
                 forked.set_exception(self._kept.failure(name) or self._kept.failed(name, str(error)))
             if isinstance(error, NoProcess):
                 return
-            raise  # a bug; but whoever waits for the component, or ends it, does not wait for ever
+            raise  # a bug, after the supervision knows that the component did not start
         if forked is not None and not forked.done():
             forked.set_result(pid)
         self._carry_out(self._supervision.forked(name, pid, self._now_s()))

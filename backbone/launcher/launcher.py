@@ -29,7 +29,7 @@ from backbone.launcher.hand_recorders import HandRecorderWatch
 from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch, ends_before
 from backbone.launcher.last_run import run_last
-from backbone.launcher.messages import AskDeclared, AskTree, Declared, NotUpYet, TreeChange
+from backbone.launcher.messages import AskDeclared, AskTree, DeclaredOrder, NotUpYet, TreeChange
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
@@ -181,7 +181,7 @@ class Launcher(Component[NoParameters]):
             case AskPeople():
                 return PeopleKnown(self._log.log.people.consoles)
             case AskDeclared(name=name):
-                return Declared(self._declared(name))
+                return DeclaredOrder(self._declared(name))
             case AskTree():
                 return self._tree.tree()
             case change if isinstance(change, TreeChange):

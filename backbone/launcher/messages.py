@@ -19,7 +19,7 @@ class AskDeclared(Message, frozen=True):
     name: Mention
 
 
-class Declared(Message, frozen=True):
+class DeclaredOrder(Message, frozen=True):
     """Answer to ``AskDeclared``.
 
     Attributes:

@@ -115,7 +115,7 @@ class MissionRecorder:
         except OSError as error:
             raise RecorderFailed(f"the recorder did not begin: {error}") from error
         assert process.stderr is not None  # noqa: S101  a pipe
-        lines = _Lines(process.stderr)
+        lines = _PrintedLines(process.stderr)
         try:
             async with asyncio.timeout(BEGUN_WITHIN_S):
                 said = await self._tell_facts(process, lines)
@@ -173,7 +173,7 @@ class MissionRecorder:
             start_new_session=True,  # Ctrl-C at the terminal ends the launcher, which ends the recorder last
         )
 
-    async def _tell_facts(self, process: Process, lines: _Lines) -> str:
+    async def _tell_facts(self, process: Process, lines: _PrintedLines) -> str:
         """Write the facts of the mission to the recorder; return its line that it records, or else the last line.
 
         Anything may come before it, because a module of the mission may print when it is imported. Without facts the
@@ -216,7 +216,7 @@ class MissionRecorder:
         self.on_changed(f"lost its recorder: {cause}{f'; {doing}' if doing else ''}")
 
 
-class _Lines:
+class _PrintedLines:
     """The lines that a process prints; of a long one, such as a progress bar, only the end."""
 
     def __init__(self, printed: asyncio.StreamReader) -> None:
@@ -230,7 +230,7 @@ class _Lines:
         return line[-LONGEST_LINE:] + end
 
 
-async def _last_line(process: Process, lines: _Lines) -> str:
+async def _last_line(process: Process, lines: _PrintedLines) -> str:
     """Wait for the end of the process; return the last line that it printed."""
     last = ""
     while line := await lines.next():

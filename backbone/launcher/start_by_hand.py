@@ -13,7 +13,7 @@ from backbone.addresses import DEPENDENCY_DATABASE, LAUNCHER
 from backbone.bus.interface import Bus
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import Refusal
-from backbone.launcher.messages import AskDeclared, Declared
+from backbone.launcher.messages import AskDeclared, DeclaredOrder
 from backbone.placer.messages import Start
 
 REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
@@ -36,7 +36,7 @@ async def completed(bus: Bus, order: Start) -> tuple[Start, str]:
     found = await bus.ask(DEPENDENCY_DATABASE, AskResources(), Resources, within_s=REPLY_TIME_S)
     if not order.name or any(order.name == each.name or order.type == each.type for each in found.resources):
         return complete(order, found.resources)
-    declared = (await bus.ask(LAUNCHER, AskDeclared(order.name), Declared, within_s=REPLY_TIME_S)).order
+    declared = (await bus.ask(LAUNCHER, AskDeclared(order.name), DeclaredOrder, within_s=REPLY_TIME_S)).order
     return (order if declared is None else as_declared(order, declared)), ""
 
 

@@ -334,7 +334,7 @@ class NotThatArc(Refusal):
     """Only an ARC itself sends, changes and withdraws its request. Nothing is changed."""
 
     code = "scheduling.not_that_arc"
-    remedy = "Tell the ARC what its owner wants: it tells the RC manager."
+    remedy = "Ask the ARC; it sends its own requests to the RC manager."
 
 
 class StaleEpoch(Refusal):

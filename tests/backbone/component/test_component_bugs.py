@@ -265,7 +265,7 @@ def test_tasks_end_with_the_component() -> None:
 
 @pytest.mark.parametrize("ordered", [True, False])
 def test_a_task_that_goes_on_after_its_cancellation_holds_up_neither_drain_nor_end(ordered: bool) -> None:
-    """Otherwise a bug elsewhere leaves its hardware as it is for ever, and nobody starts the component again."""
+    """Otherwise the hardware stays as it is after a bug elsewhere, and the creator does not restart the component."""
 
     async def law() -> None:
         stage = Stage(hold="serve")
@@ -288,7 +288,7 @@ def test_a_task_that_goes_on_after_its_cancellation_holds_up_neither_drain_nor_e
 
 @pytest.mark.parametrize("ordered", [True, False])
 def test_after_a_bug_a_drain_that_never_returns_does_not_hold_up_the_end(ordered: bool) -> None:
-    """Nobody ordered the end, so nobody else ends the component."""
+    """A creator limits only ends that were ordered, so the component limits this one itself."""
 
     async def law() -> None:
         stage = Stage(hold="drain")

@@ -11,7 +11,7 @@ from backbone.addresses import DEPENDENCY_DATABASE, LAUNCHER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.dependency_database.messages import AskResources, Resource, Resources
-from backbone.launcher.messages import AskDeclared, Declared
+from backbone.launcher.messages import AskDeclared, DeclaredOrder
 from backbone.launcher.start_by_hand import OtherType, complete, completed
 from backbone.placer.messages import Start
 from backbone.wire import Envelope
@@ -61,7 +61,7 @@ def asked(local_mission: Any) -> Asked:
     async def answer(question: Envelope[Any]) -> Any:
         match question.body:
             case AskDeclared(name=name):
-                return Declared(DAY if name == DAY.name else None)
+                return DeclaredOrder(DAY if name == DAY.name else None)
             case _:
                 return Resources([SCOUT1])
 
