@@ -78,9 +78,14 @@ class ScheduleState:
         self.version += 1
 
     def _service_changed(self, rcs: Collection[str]) -> None:
-        """Drop the cached answers about these RCs, and the cached first ARCs in line everywhere."""
+        """Drop the cached answers about these RCs, and the cached first ARCs in line everywhere.
+
+        The change also concerns the other RCs of the ARCs that use them, because such an ARC keeps its place in line
+        there only while it is usable.
+        """
         self.service_version += 1
-        self.concerns(rcs)
+        users = [user for rc in rcs for user in self.users.get(rc, ())]
+        self.concerns(dict.fromkeys([*rcs, *[rc for user in users for rc in user.uses]]))
         self.compatibility.service_changed(rcs)
 
     # RCs.
