@@ -45,14 +45,12 @@ class LargeGroupPlanner:
         self._near[rc] = None
 
     def due(self, now_s: float) -> Turn | None:
-        """Return a candidate whose time is now; after that the others are no longer candidates."""
+        """Return a turn whose time is now, of the most senior candidate; after None there are no candidates."""
         table = self._table
-        self._examine()
-        while self._candidates:
-            arc, _ = self._candidates.popitem()
-            holders = table.holders(arc)
-            if not (arc.state is RequestState.WAITING and table.could_start(arc, holders, now_s) and table.usable(arc)):
-                continue
+        possible = self._possible(now_s)
+        self._candidates = dict.fromkeys(possible)
+        for arc, holders in possible.items():
+            del self._candidates[arc]
             if self._firsts.takes_from_others(arc, holders, now_s):
                 continue
             staying = [one for one in holders if table.stands_until_s(one, arc, now_s) > now_s + INSTANT_S]
@@ -66,6 +64,19 @@ class LargeGroupPlanner:
                 continue
             return turn
         return None
+
+    def _possible(self, now_s: float) -> dict[ArcEntry, list[ArcEntry]]:
+        """Return the candidates that no single holder keeps from starting now, most senior first, and their holders.
+
+        Behind a higher first in line, no reservation but this order keeps one of them from taking every gap.
+        """
+        self._examine()
+        table, fairness = self._table, self._state.fairness
+        waiting = [arc for arc in self._candidates if arc.state is RequestState.WAITING]
+        holders = {arc: table.holders(arc) for arc in waiting}
+        possible = [arc for arc in waiting if table.could_start(arc, holders[arc], now_s) and table.usable(arc)]
+        possible.sort(key=lambda arc: fairness.seniority(arc, now_s))
+        return {arc: holders[arc] for arc in possible}
 
     def _examine(self) -> None:
         """Make those ARCs candidates again that are concerned by changes since the last examination.

@@ -123,10 +123,25 @@ def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardwar
         pytest.param(550, id="two equals that are each first at an RC of the other's wait for each other for ever"),
         pytest.param(187, id="an estimate made for one ARC is believed for another"),
         pytest.param(1127, id="RCs freed by force stay free although a higher ARC needs one of them first"),
+        pytest.param(5179, id="a higher ARC waits on: the one before it in line lost an RC that both do not share"),
     ],
 )
 def test_in_a_big_group_no_arc_waits_for_rcs_that_are_free_or_served(seed):
     assert violations(play(*random_mission(Random(seed), exact_up_to=0))) == []
+
+
+@settings(max_examples=share(40))
+@given(st.lists(st.tuples(st.booleans(), st.integers(0, 4)), min_size=2, max_size=6), st.sampled_from([0, 64]))
+def test_equals_that_fill_the_gaps_of_a_higher_arc_take_turns(equals, exact_up_to):
+    """Fails without the order of the candidates: one of them took every gap, and the others waited for ever."""
+    bench = Bench(manager(exact_up_to=exact_up_to), unit("u"), unit("v"), unit("w"))
+    bench.tell(ask("high", "u", priority=2, run_s=8.0))
+    bench.tell(ask("first", "u v", priority=2, run_s=6.0))
+    for number, (uses_both, begin_s) in enumerate(equals):
+        bench.at(float(begin_s), ask(f"a{number}", "v w" if uses_both else "v", run_s=2.0))
+    assert violations(bench.run(140.0)) == []
+    turns = [len(bench.runs(f"a{number}")) for number in range(len(equals))]
+    assert max(turns) - min(turns) <= 1, turns
 
 
 @pytest.mark.parametrize("seed", range(share(6)))
