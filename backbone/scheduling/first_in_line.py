@@ -79,14 +79,19 @@ class FirstInLine:
         firsts = dict.fromkeys(first for first in at.values() if first is not None)
         if arc not in firsts and self._takes_from(firsts, arc, holders, now_s):
             return True  # most candidates end here
-        higher_ones = self._higher_than(arc)
+        users = dict.fromkeys(user for rc in arc.uses for user in self._state.users[rc] if user.queued)
+        higher_ones = [one for one in users if one.level is not arc.level and one.goes_before(arc)]
+        others = [one for one in higher_ones if one not in firsts]
         if arc in firsts:
             # Equality is not transitive: two ARCs can each be first at a common RC. The lower one then waits.
             higher_waits = any(map(self._table.usable, higher_ones))
             ahead = set() if higher_waits else {rc for rc, first in at.items() if first is arc}
             if self._takes_from([first for first in firsts if ahead.isdisjoint(first.uses)], arc, holders, now_s):
                 return True
-        return self._takes_from([one for one in higher_ones if one not in firsts], arc, holders, now_s)
+        else:
+            # An ARC for which RCs are being freed is not the first in line behind a higher one.
+            others += [one for one in users if self._is_being_freed_for(one, arc)]
+        return self._takes_from(others, arc, holders, now_s)
 
     def _takes_from(self, others: Iterable[ArcEntry], arc: ArcEntry, holders: Sequence[ArcEntry], now_s: float) -> bool:
         """Return whether the run of the ARC, beside those holders that leave it room, would delay one of the others."""
@@ -98,9 +103,10 @@ class FirstInLine:
             if other is not arc and not fits(arc, [other, *crowd]) and self._table.usable(other)
         )
 
-    def _higher_than(self, arc: ArcEntry) -> list[ArcEntry]:
-        users = dict.fromkeys(user for rc in arc.uses for user in self._state.users[rc])
-        return [one for one in users if one.queued and one.level is not arc.level and one.goes_before(arc)]
+    def _is_being_freed_for(self, other: ArcEntry, arc: ArcEntry) -> bool:
+        """Return whether RCs are being freed for the other ARC, since before any for this one, which is not higher."""
+        own = math.inf if arc.reservation is None else arc.reservation
+        return other.reservation is not None and other.reservation < own and not arc.goes_before(other)
 
     def _must_be_done_s(self, arc: ArcEntry, start_s: float) -> float:
         """Return when others may need the RCs of an ARC that starts then; hand-overs may use up the slack."""
