@@ -10,6 +10,7 @@ from backbone.dry_run.run import FIRST_MINUTE_S, dry_run
 from backbone.dry_run.screen import screen
 from backbone.launcher.endings import ExitCode, say
 from backbone.mission.model import MissionDescription
+from backbone.run_files import TraceUnwritable, begin_trace
 from backbone.scheduling.own_planner import WrongPlanner
 
 
@@ -21,14 +22,16 @@ def print_dry_run(
     Args:
         description: The mission.
         for_s: Mission seconds; None: the first minute.
-        trace: File for the trace.
+        trace: File for the trace, which must be new or empty.
         width: Width of tables; None: the terminal's.
     """
     try:
+        if trace is not None:
+            begin_trace(trace)
         dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
-    except WrongPlanner as refused:
-        say(f"{refused} (remedy: {refused.remedy})")
-        return ExitCode.MISSION_INVALID
+    except (WrongPlanner, TraceUnwritable) as refused:
+        say(f"{refused.detail} (remedy: {refused.remedy})")
+        return ExitCode.REFUSED if isinstance(refused, TraceUnwritable) else ExitCode.MISSION_INVALID
     Console(width=width, markup=False, emoji=False).print(screen(dry))
     if trace is not None:
         try:

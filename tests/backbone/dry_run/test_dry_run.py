@@ -249,7 +249,15 @@ def test_the_command_writes_a_trace_that_ends_when_it_was_told(check: Callable[.
 
 
 def test_a_trace_that_cannot_be_written_is_told(check: Callable[..., Any], tmp_path: Path) -> None:
-    assert check("--dry-run", "--trace", tmp_path / "no" / "such" / "folder").exit_code == 1
+    assert check("--dry-run", "--trace", tmp_path / "no" / "such" / "folder").exit_code == 5
+
+
+def test_a_trace_replaces_no_file(check: Callable[..., Any], tmp_path: Path) -> None:
+    file = tmp_path / "mission.xml"
+    file.write_text("notes")
+    refused = check("--dry-run", "--trace", file)
+    assert (refused.exit_code, file.read_text()) == (5, "notes")
+    assert "has content (remedy: Name a new file" in refused.stderr
 
 
 @pytest.mark.parametrize("words", [("--for", "5"), ("--trace", "x.jsonl"), ("--dry-run", "--for", "0")], ids=" ".join)
