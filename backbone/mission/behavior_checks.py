@@ -11,6 +11,7 @@ from backbone.mission.reading_checks import check_readings, check_vision
 from backbone.mission.report import Report, listed
 from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
+from backbone.scheduling.alternatives import SHORTEST_RUNTIME_S
 from backbone.spoken import counted
 
 TRIES_AT_MOST = 100_000  # chosen: a third of a second; a set that fits is found in the first few tries
@@ -93,6 +94,12 @@ def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
 
 def _check_runtime(behavior: Element, arc: Element, report: Report) -> None:
     minimum_s, maximum_s = arc.number("minimum-runtime-s"), arc.number("maximum-runtime-s")
+    if minimum_s is not None and 0 < minimum_s < SHORTEST_RUNTIME_S:
+        report.fault(
+            arc.place_of("minimum-runtime-s"),
+            f"minimum run time {minimum_s:g} s of {behavior.text('name')} is shorter than a context switch",
+            f"Write at least {SHORTEST_RUNTIME_S:g}",
+        )
     if minimum_s is not None and maximum_s is not None and 0 < maximum_s < minimum_s:
         report.fault(
             arc.place_of("maximum-runtime-s"),
