@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Coroutine, Iterable, Iterator
+from dataclasses import dataclass
 from typing import Protocol
+
+import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.story import StoryBook
@@ -27,6 +30,7 @@ from backbone.rc_manager.messages import (
     Withdraw,
 )
 from backbone.rc_manager.recovery import Recovery
+from backbone.scheduling.alternatives import can_be_planned
 from backbone.scheduling.events import Departed, Event
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest
 from backbone.scheduling.views import RequestAttributes
@@ -36,6 +40,17 @@ log = logging.getLogger(__name__)
 
 OF_AN_ARC = (SchedulingRequest, Withdraw, SetIdle, ChangeRuntime, Extend)
 ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; without an answer it hangs or is gone
+
+
+@dataclass(slots=True, eq=False)
+class Choosing:
+    """A request for which RCs are being chosen.
+
+    Attributes:
+        request: The request, with the changes that its ARC has sent meanwhile; None: the ARC withdrew it, or ended.
+    """
+
+    request: SchedulingRequest | None
 
 
 class ArcService(Protocol):
@@ -70,7 +85,7 @@ class ArcWatch:
     def __init__(self, service: ArcService, switches: ArcSwitches, recovery: Recovery) -> None:
         self._service, self._switches, self._recovery = service, switches, recovery
         self._beats = Beats(service.clock.rate)
-        self._requesting: Counter[str] = Counter()
+        self._requesting: defaultdict[str, list[Choosing]] = defaultdict(list)
 
     def require_sender(self, asked: Envelope[Message]) -> None:
         """Check that a request of an ARC, or a change of it, comes from this ARC.
@@ -84,29 +99,48 @@ class ArcWatch:
             raise NotThatArc(f"the RC manager does not take {what} from {asked.source}", source=asked.source)
 
     @contextlib.contextmanager
-    def choosing(self, arc: str) -> Iterator[None]:
-        """Count a request of this ARC as one for which RCs are being chosen."""
-        self._requesting[arc] += 1
+    def choosing(self, request: SchedulingRequest) -> Iterator[Choosing]:
+        """Keep the request up to date while RCs are being chosen for it: this may include the start of an RC."""
+        choosing = Choosing(request)
+        self._requesting[request.arc].append(choosing)
         try:
-            yield
+            yield choosing
         finally:
-            self._requesting[arc] -= 1
+            self._requesting[request.arc].remove(choosing)
+            if not self._requesting[request.arc]:
+                del self._requesting[request.arc]
 
     def is_choosing(self) -> bool:
         """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
-        return self._requesting.total() > 0
+        return bool(self._requesting)
+
+    def keep_change(self, change: Message) -> None:
+        """Apply the change of an ARC's request also to those for which RCs are being chosen."""
+        match change:
+            case SetIdle(arc=arc, idle=idle):
+                self._change(arc, idle=idle)
+            case ChangeRuntime(arc=arc, minimum_runtime_s=least_s, maximum_runtime_s=most_s):
+                if can_be_planned(least_s, max(least_s, most_s)):
+                    self._change(arc, minimum_runtime_s=least_s, maximum_runtime_s=most_s)
+
+    def _change(self, arc: str, **changes: bool | float) -> None:
+        for choosing in self._requesting.get(arc, ()):
+            if choosing.request is not None:
+                choosing.request = msgspec.structs.replace(choosing.request, **changes)
 
     @property
     def known(self) -> list[str]:
         """The ARCs that ask for RCs."""
-        return [*self._beats.heard_s]
+        return [*dict.fromkeys([*self._beats.heard_s, *self._requesting])]
 
     def remember(self, arc: str) -> None:
         """Know the ARC from now on: it asks for RCs."""
         self._beats.heard(arc, self._service.clock.now_s())
 
     def forget(self, arc: str) -> bool:
-        """Know the ARC no longer, and expect no beats; return whether it was known."""
+        """Know the ARC and its requests no longer, and expect no beats; return whether a request was admitted."""
+        for choosing in self._requesting.get(arc, ()):
+            choosing.request = None
         return self._beats.forget(arc)
 
     def end_silent(self) -> None:
@@ -122,13 +156,14 @@ class ArcWatch:
             return
         if arc in self._beats.heard_s:
             self._beats.heard(arc, self._service.clock.now_s())
-        elif arc not in self._switches and not self._requesting[arc]:
+        elif arc not in self._switches and arc not in self._requesting:
             self._switches.begin(arc, lambda: self._meet(arc))
 
     async def _meet(self, arc: str) -> None:
         """Readmit an ARC that beats but is unknown: it hung, or its request was lost with an earlier manager."""
         current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
-        if current is None or arc in self._beats.heard_s or self._requesting[arc] or self._service.admit_again(current):
+        is_known = arc in self._beats.heard_s or arc in self._requesting
+        if current is None or is_known or self._service.admit_again(current):
             return
         try:
             await self._service.request(current.request)  # its own request was lost, or is still on its way

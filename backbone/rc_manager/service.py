@@ -166,6 +166,7 @@ class RcManager(Component[RcManagerParameters]):
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ARCs, consoles and tools."""
         self._arcs.require_sender(asked)
+        self._arcs.keep_change(asked.body)
         match asked.body:
             case SchedulingRequest() as request:
                 return await self.request(request)
@@ -201,15 +202,17 @@ class RcManager(Component[RcManagerParameters]):
         return Done()
 
     async def request(self, request: SchedulingRequest) -> Scheduled:
-        """Choose RCs for the request, and admit it.
+        """Choose RCs for the request, and admit it, unless its ARC withdraws or ends meanwhile: then it is idle.
 
         Raises:
             Refusal: The request cannot be scheduled.
         """
-        with self._arcs.choosing(request.arc):
+        with self._arcs.choosing(request) as choosing:
             rcs = await self._hardware.choose(request)
             await self._rcs.have_running(rcs)
-            self._admit(request, rcs)
+            if choosing.request is None:
+                return Scheduled([*rcs], RequestState.IDLE, 0, [], -1.0)
+            self._admit(choosing.request, rcs)
         return self.answers.scheduled(request.arc, self.clock.now_s())
 
     def is_choosing(self) -> bool:
