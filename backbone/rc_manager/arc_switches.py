@@ -79,10 +79,12 @@ class ArcSwitches:
     async def _connect(self, order: ConnectArc) -> None:
         failed = await self._context_switch.connect(order)
         if failed is None:
+            self._rcs.connected(order.epochs)
             self._times.granted(order.epochs, order.arc, order.settle_s, self._service.clock.now_s())
             self._service.happened(Opened(order.arc))
             return
-        self._rcs.failed(failed)
+        if failed:
+            self._rcs.failed(failed)
         self._service.happened(OpenFailed(order.arc, failed))
         if failed:
             self._rcs.meet_in_a_while(failed)

@@ -32,6 +32,7 @@ log = logging.getLogger(__name__)
 
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
 MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease, because mostly an old hold keeps an RC from connecting
+MEET_LATEST_S = 16.0  # chosen: meanwhile an ARC preempted for a vain connection gets some of the papers' 5 s slices
 
 
 class Service(Protocol):
@@ -81,6 +82,7 @@ class RcWatch:
         self.resources: dict[str, Resource] = {}
         self.up: set[str] = set()
         self._failing: set[str] = set()
+        self._pauses_s: dict[str, float] = {}
         self._meeting: Counter[str] = Counter()
         self._faults: dict[str, str] = {}
         self._doubted: set[str] = set()
@@ -146,19 +148,29 @@ class RcWatch:
         self._service.start_task(again(), f"meet {rc}")
 
     def meet_in_a_while(self, rc: str) -> None:
-        """Check a failed RC until it is up; not at once, because RC and schedule could retry each other for ever."""
+        """Check a failed RC until it is up; not at once, because RC and schedule could retry each other for ever.
+
+        Each retry may preempt holders of other RCs, so the wait doubles with each further connection in vain.
+        """
         if rc not in self._failing:
             self._failing.add(rc)
-            self._service.start_task(self._meet_later(rc), f"meet {rc}")
+            self._service.start_task(self._meet_later(rc, self._pauses_s.get(rc, MEET_AGAIN_S)), f"meet {rc}")
+
+    def connected(self, rcs: Iterable[str]) -> None:
+        """Note that these RCs were connected."""
+        for rc in rcs:
+            self._pauses_s.pop(rc, None)
 
     def failed(self, rc: str) -> None:
-        """Count the RC as down; the caller has informed the schedule manager."""
+        """Count the RC as down after a connection in vain; the caller informs the schedule manager."""
         self.up.discard(rc)
+        self._pauses_s[rc] = min(MEET_LATEST_S, 2 * self._pauses_s.get(rc, MEET_AGAIN_S / 2))
 
     def forget(self, rc: str) -> bool:
         """Count an RC whose component is gone as down; return whether it was up or put aside."""
         was_known = rc in self.up or bool(self._faults.pop(rc, ""))
         self.up.discard(rc)
+        self._pauses_s.pop(rc, None)  # its next process may be sound
         return was_known
 
     def does_not_answer(self, rc: str) -> None:
@@ -206,10 +218,10 @@ class RcWatch:
             del self._starts[rc]
         await self.meet(rc)
 
-    async def _meet_later(self, rc: str) -> None:
+    async def _meet_later(self, rc: str, after_s: float) -> None:
         clock = self._service.clock
         try:
-            await clock.sleep_s(MEET_AGAIN_S * clock.rate)
+            await clock.sleep_s(after_s * clock.rate)
             while not await self.meet(rc) and rc in await self._recovery.present():
                 await clock.sleep_s(MEET_AGAIN_S * clock.rate)
         finally:

@@ -69,13 +69,15 @@ class PlainRc(Component[Any]):
         self.holders: dict[str, int] = {}
         self.last_epoch = 0
         self.log: list[tuple[str, str]] = []
-        self.hangs = self.does_not_obey = False
+        self.hangs = self.does_not_obey = self.is_broken = False
         self.tells: Callable[[RcState], RcState] = lambda state: state
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         if self.hangs:
             await self.clock.sleep_s(60.0)
         match asked.body:
+            case Connect() if self.is_broken:
+                raise HardwareFault(f"{self.name} is broken")
             case Connect(arc=arc, epoch=epoch):
                 if epoch <= self.last_epoch:
                     raise StaleEpoch(f"{epoch} after {self.last_epoch}")

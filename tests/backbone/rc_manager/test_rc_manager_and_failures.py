@@ -22,6 +22,7 @@ from backbone.rc_manager.messages import (
     Done,
     SetIdle,
 )
+from backbone.rc_manager.rc_watch import MEET_LATEST_S
 from backbone.scheduling.requests import (
     LEASE_S,
 )
@@ -244,6 +245,26 @@ def test_a_set_that_cannot_be_connected_whole_is_given_back_whole(pool: Any) -> 
             here.rcs["video"].holders.clear()
             await here.clock.sleep_s(1.0)
             assert one.is_open
+
+    run_virtual(main())
+
+
+def test_an_rc_that_cannot_be_connected_takes_other_rcs_from_their_holders_less_and_less(pool: Any) -> None:
+    """The console wants a robot that is broken, and with it the frequency of another robot."""
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            behavior, console = await here.arc("behavior"), await here.arc("console")
+            here.rcs["left"].is_broken = True
+            await behavior.ask_for(request("behavior", "right", "video"))
+            await console.ask_for(request("console", "left", "video", priority=100))
+            await here.clock.sleep_s(120.0)
+            closed_s = [at_s for what, _, at_s in behavior.log if what == "higher"]
+            assert len(closed_s) <= 12
+            assert closed_s[-1] - closed_s[-2] > 3 * 5.0, "the behavior gets whole slices"
+            here.rcs["left"].is_broken = False
+            await here.clock.sleep_s(MEET_LATEST_S + 1.0)
+            assert console.is_open
 
     run_virtual(main())
 
