@@ -31,7 +31,8 @@ from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.transitions import Transitions, because
 
 _NO_USE = RcUse()
-RETRY_S = 1.0  # chosen: retries of an ARC that cannot open its gate, at a pace that leaves time for its rivals
+RETRY_S = 1.0  # chosen: first retry of an ARC that cannot open its gate; each retry may preempt lower ARCs
+LONGEST_RETRY_S = 30.0  # chosen: as long as an owner waits that asked in vain again and again; some whole slices
 
 
 class ArcEvents:
@@ -61,6 +62,7 @@ class ArcEvents:
         self._grid_s = rules.grid_s
         self._successors: dict[str, Requested] = {}
         self.retrying: dict[str, ArcEntry] = {}
+        self._retries_s: dict[str, float] = {}
         self._damping = Damping()
         self._packet_times = PacketTimes()
         self.understating: dict[str, ArcEntry] = {}
@@ -252,19 +254,24 @@ class ArcEvents:
         """Begin the slice: the ARC's RCs have settled and its gate is open."""
         arc = self._state.arcs.get(name)
         if arc is not None and arc.state is RequestState.CONNECTING:
+            self._retries_s.pop(name, None)
             self._transitions.grant(arc)
 
     def open_failed(self, name: str, rc: str) -> None:
-        """Queue or idle an ARC whose RCs did not all connect (``rc`` counts as down), or whose gate stayed shut."""
+        """Queue an ARC whose RCs did not all connect (``rc`` counts as down), or idle one whose gate stayed shut.
+
+        The wait before its retry doubles as long as its gate does not open.
+        """
         arc = self._state.arcs.get(name)
         if arc is None or arc.state is not RequestState.CONNECTING:
             return
         if rc in arc.uses:
             self._transitions.lose(arc, "rc", rc)
         else:
-            self._record_idle(name, f"it could not open its gate; again in {RETRY_S:g} s")
+            wait_s = self._retries_s[name] = min(LONGEST_RETRY_S, 2 * self._retries_s.get(name, RETRY_S / 2))
+            self._record_idle(name, f"it could not open its gate; again in {wait_s:g} s")
             self._transitions.lose(arc, "failed", "", Afterwards.IDLE)
-            self._wait_to_ask(arc, RETRY_S, "it could not open its gate")
+            self._wait_to_ask(arc, wait_s, "it could not open its gate")
         self.freed(name)
 
     def freed(self, name: str) -> None:
@@ -335,6 +342,7 @@ class ArcEvents:
 
     def _forget(self, arc: ArcEntry) -> None:
         self.retrying.pop(arc.name, None)
+        self._retries_s.pop(arc.name, None)
         self.understating.pop(arc.name, None)
         self._state.forget(arc)
         successor = self._successors.pop(arc.name, None)

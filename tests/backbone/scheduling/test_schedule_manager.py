@@ -5,7 +5,7 @@ import gc
 import pytest
 from simulated_switches import REPAIR_S, Bench, all_of, ask, load, manager, sharable, states, unit
 
-from backbone.scheduling.arc_events import RETRY_S
+from backbone.scheduling.arc_events import LONGEST_RETRY_S, RETRY_S
 from backbone.scheduling.events import (
     Adopted,
     CapacityChanged,
@@ -301,6 +301,28 @@ def test_an_arc_that_cannot_open_its_gate_lets_others_run_and_is_asked_again():
     assert bench.runs("b") == [(0, None)]
     bench.run(3.0)
     assert bench.runs("a") == [(RETRY_S, None)]
+    assert bench.verdict() == []
+
+
+class Lasting(dict[str, str]):
+    """Failures that come again with each connection."""
+
+    def pop(self, arc: str) -> str:
+        return self[arc]
+
+
+def test_an_arc_that_never_opens_its_gate_leaves_lower_ones_whole_slices():
+    bench = Bench(manager(), unit("v", connect_s=0.1))
+    bench.fails = Lasting(a="")
+    bench.tell(ask("a", "v", priority=2))
+    bench.tell(ask("b", "v"))
+    bench.run(120.0)
+    lengths_s = [end_s - start_s for start_s, end_s in bench.runs("b") if end_s]
+    assert len(lengths_s) <= 8
+    assert lengths_s[-1] > 2 * 5.0
+    bench.fails.clear()
+    bench.run(120.0 + LONGEST_RETRY_S)
+    assert bench.runs("a")
     assert bench.verdict() == []
 
 
