@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import get_origin
 
+from backbone.errors import Refusal
+from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, write
 from mission_control.modules.graph import Graph, GraphRefused, Member, WiringFault
 from mission_control.modules.module import Module
 from mission_control.modules.orders import WrongModule
@@ -121,3 +123,33 @@ def _is_of(value: object, kind: object) -> bool:
     if get_origin(kind) is not None or not isinstance(kind, type):
         return True
     return isinstance(value, (float, int) if kind is float else kind)
+
+
+def judge_of_sent(
+    source: str, most_bytes: Mapping[str, int], kinds: Mapping[str, type[Message]], member: Member
+) -> Callable[[object], None]:
+    """Return a function that raises if an output cannot be published, or its listeners could not read it.
+
+    Args:
+        source: Address of the sender.
+        most_bytes: Key of a published output → longest message.
+        kinds: Key → class that listeners expect.
+    """
+    sent = [(port.name, key, Reader(kinds[key])) for key, port in member.keyed_outputs if key in most_bytes]
+
+    def judge(outputs: object) -> None:
+        for name, key, reader in sent:
+            value = getattr(outputs, name)
+            if value is None:
+                continue
+            most = most_bytes[key]
+            try:
+                reader.read(write(Envelope(WIRE_VERSION, source, 1, 0.0, "", value), most), most)
+            except Exception as error:  # also a field of a class that no message may have
+                cause = error.detail if isinstance(error, Refusal) else error
+                told = f"update of {member.name} returned {key}, which cannot be sent: {cause}"
+                raise WrongModule(
+                    told, remedy="Return fields of the declared types, in a message that fits."
+                ) from error
+
+    return judge

@@ -14,18 +14,20 @@ from backbone.component.log_level import LogLevel
 from backbone.errors import Refusal, complaint
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
 from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, remark_on_file
+from backbone.keys import Conversation
 from backbone.naming import did_you_mean
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
+from backbone.quality import QUALITY
 from backbone.reading_anew import HANGS, READ_WITHIN_S, read_anew
 from backbone.waiting import in_thread_within
 from mission_control.modules.choice import SourceChoice
 from mission_control.modules.exchange import Exchange
-from mission_control.modules.exchangeable import graph_with, judge_of, kinds_made
+from mission_control.modules.exchangeable import graph_with, judge_of, judge_of_sent, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
-from mission_control.modules.graph import Graph
+from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import UNSEEN, Module
-from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, load_module_class
+from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, is_message, load_module_class
 
 LEAST_WAIT_S = 0.01  # chosen: if a round runs in a thread when the time of its exchange is over, the round ends soon
 
@@ -134,8 +136,22 @@ class UnitExchanges:
             lambda: _unless_closed(loop, changed),
             self._component.clock.now_s(),
         )
-        judge = judge_of(self._kinds, type(new), member)
+        is_declared, is_readable = judge_of(self._kinds, type(new), member), self._judge_of_sent(member)
+
+        def judge(outputs: object) -> None:
+            is_declared(outputs)
+            if not exchange.is_over:  # what a listener cannot read is a bug afterwards, as without an exchange
+                is_readable(outputs)
+
         return WantedExchange(graph, asked.module, new, exchange, judge), changed
+
+    def _judge_of_sent(self, member: Member) -> Callable[[object], None]:
+        """Return a function that raises if a published output cannot be sent; see ``judge_of_sent``."""
+        given = self._component.parameters
+        qualities = {key: given.qualities.get(key, QUALITY[Conversation.OUTPUTS]) for key in given.published}
+        most_bytes = {key: max(one.most_bytes, one.most_bytes_on_host) for key, one in qualities.items()}
+        kinds = {key: kind for key, kind in self._kinds.items() if is_message(kind)}
+        return judge_of_sent(self._component.address, most_bytes, kinds, member)
 
     async def _until_over(self, candidate: _Candidate, exchange: Exchange, changed: asyncio.Event) -> None:
         clock, views = self._component.clock, candidate.old.debug

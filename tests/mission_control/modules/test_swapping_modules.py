@@ -256,6 +256,11 @@ def test_a_class_that_cannot_be_made_is_refused_and_nothing_changes(
         ("raise KeyboardInterrupt", "KeyboardInterrupt"),
         (r"raise ValueError('no model caf\udce9')", r"no model caf\udce9"),
         ("return self.Outputs(None)", "not ready within"),
+        ("return self.Outputs(Count('one', 'second'))", "count, which cannot be sent: Count/1: Expected `int`"),
+        ("return self.Outputs(Count(1, {1}.pop))", "count, which cannot be sent: Encoding objects"),
+        (r"return self.Outputs(Count(1, '\udce9'))", "count, which cannot be sent: Count has a text that is not UTF-8"),
+        ("return self.Outputs(Count(1, ' ' * 2**26))", "count, which cannot be sent: Count of 67108"),
+        ("return self.Outputs(type('Sub', (Count,), {}, frozen=True)(1, ''))", "cannot be sent: Sub/1 is not answered"),
     ],
 )
 def test_a_new_one_that_fails_gives_way_to_the_old_one_and_the_cause_is_named(
