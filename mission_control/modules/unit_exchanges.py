@@ -20,7 +20,7 @@ from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
 from backbone.quality import QUALITY
 from backbone.reading_anew import HANGS, READ_WITHIN_S, read_anew
-from backbone.waiting import in_thread_within
+from backbone.waiting import in_thread_within, set_within
 from mission_control.modules.choice import SourceChoice
 from mission_control.modules.exchange import Exchange
 from mission_control.modules.exchangeable import graph_with, judge_of, judge_of_sent, kinds_made
@@ -157,11 +157,9 @@ class UnitExchanges:
         clock, views = self._component.clock, candidate.old.debug
         while not exchange.is_over:
             left_s = max(LEAST_WAIT_S, (exchange.due_s - clock.now_s()) / clock.rate)
-            try:
-                async with asyncio.timeout(left_s):
-                    await changed.wait()
-            except TimeoutError:
+            if not await set_within(changed, left_s):
                 exchange.pass_time(clock.now_s())
+                continue
             changed.clear()
             if exchange.phase is ExchangePhase.PROVING:
                 candidate.new.debug, candidate.old.debug = views, UNSEEN

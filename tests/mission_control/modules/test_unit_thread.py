@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import os
+import sys
 import threading
 import time
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -18,8 +20,9 @@ from sample_modules import Number
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
-from backbone.component.messages import AskStatistics, Statistics
+from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.debug_views import ListViews, Views
+from backbone.exchange import SwapModule, Swapped
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.waiting import end_tasks
@@ -225,6 +228,48 @@ async def test_a_stop_iteration_in_the_thread_ends_the_unit_too(local_mission: A
 
     with pytest.raises(RuntimeError, match="update of reading raised StopIteration"):
         await until_it_ends()
+
+
+HELD = threading.Event()
+HANGING = f"""
+from {__name__} import HELD, WITHIN_S, Passing
+
+
+class Hanging(Passing):
+    def update(self, inputs):
+        assert HELD.wait(WITHIN_S)
+        return super().update(inputs)
+"""
+
+
+@pytest.fixture
+def hanging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """Class path of a module whose update waits until ``HELD`` is set."""
+    (tmp_path / "hanging_in_its_thread.py").write_text(HANGING)
+    monkeypatch.syspath_prepend(tmp_path)
+    HELD.set()
+    yield "hanging_in_its_thread:Hanging"
+    HELD.set()
+    sys.modules.pop("hanging_in_its_thread", None)
+
+
+async def test_a_long_round_of_an_exchange_is_waited_for_without_a_word(
+    local_mission: Any, beside: Any, hanging: str
+) -> None:
+    heard: asyncio.Queue[str] = asyncio.Queue()
+    async with units(local_mission, beside, ORDERS[:1], "same") as (bus, _same), asyncio.timeout(WITHIN_S):
+        bus.subscribe("mission_control/one", Conversation.LOG, StoryEvent, lambda one: heard.put_nowait(one.body.what))
+        asked = SwapModule("passing", hanging, prove_s=1.0)
+        swapping = asyncio.create_task(bus.ask("mission_control/one", asked, Swapped, within_s=WITHIN_S))
+        assert "warms" in await heard.get()
+        bus.publish(TESTER, Conversation.EVENTS, Number(1.0))
+        assert "has to prove itself" in await heard.get()
+        HELD.clear()
+        bus.publish(TESTER, Conversation.EVENTS, Number(2.0))
+        await asyncio.sleep(1.3)  # the time to prove itself is over, and the round goes on
+        HELD.set()
+        assert (await swapping).is_proved
+        assert "goes on" in await heard.get()
 
 
 async def test_an_output_that_cannot_be_sent_is_a_bug_of_the_unit_and_does_not_hold_up_the_next() -> None:
