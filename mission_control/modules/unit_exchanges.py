@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import NoReturn
 
 import msgspec
 
@@ -29,6 +30,8 @@ from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import UNSEEN, Module
 from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, is_message, load_module_class
 
+HANGS_S = 30.0  # chosen: far longer than any round at work, and the command still waits then; machine seconds
+MOST_COUNTED_S = 0.1  # chosen: of the time between two looks, because a process that was paused does not hang
 LEAST_WAIT_S = 0.01  # chosen: if a round runs in a thread when the time of its exchange is over, the round ends soon
 
 
@@ -154,18 +157,35 @@ class UnitExchanges:
         return judge_of_sent(self._component.address, most_bytes, kinds, member)
 
     async def _until_over(self, candidate: _Candidate, exchange: Exchange, changed: asyncio.Event) -> None:
-        clock, views = self._component.clock, candidate.old.debug
+        clock, views, loop = self._component.clock, candidate.old.debug, asyncio.get_running_loop()
+        overdue_s = 0.0
         while not exchange.is_over:
-            left_s = max(LEAST_WAIT_S, (exchange.due_s - clock.now_s()) / clock.rate)
+            left_s, looked_s = max(LEAST_WAIT_S, (exchange.due_s - clock.now_s()) / clock.rate), loop.time()
             if not await set_within(changed, left_s):
                 exchange.pass_time(clock.now_s())
+                overdue_s += min(loop.time() - looked_s, MOST_COUNTED_S)
+                if overdue_s > HANGS_S and not exchange.is_over:
+                    self._end_unit(candidate)
                 continue
             changed.clear()
+            overdue_s = 0.0
             if exchange.phase is ExchangePhase.PROVING:
                 candidate.new.debug, candidate.old.debug = views, UNSEEN
                 self._tell(candidate.asked, f"{candidate.order.class_path} produces, and has to prove itself")
         is_new = exchange.phase is ExchangePhase.PROVED
         candidate.new.debug, candidate.old.debug = (views, UNSEEN) if is_new else (UNSEEN, views)
+
+    def _end_unit(self, candidate: _Candidate) -> NoReturn:
+        """End the unit, because a round hangs in its thread: no heartbeat is missing, so its creator sees nothing.
+
+        Raises:
+            WrongModule: The unit ends.
+        """
+        old, new = candidate.before.class_path, candidate.order.class_path
+        told = f"a round with {new} has not ended for {HANGS_S:g} s, so the unit ends"
+        self._component.fail(RuntimeError(told))
+        then = remark_on_file(self._component.name, old, new) or "the unit starts again with the old class"
+        raise WrongModule(told, remedy=f"Look for a loop or a wait in update; {then}.")
 
     def _returned(self, candidate: _Candidate, exchange: Exchange) -> Swapped:
         old, new = candidate.before.class_path, candidate.order.class_path

@@ -27,12 +27,12 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.waiting import end_tasks
 from backbone.wire import OversizedMessage
-from mission_control.modules import unit_thread
+from mission_control.modules import unit_exchanges, unit_thread
 from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module
-from mission_control.modules.orders import ModuleOrder, Source, UnitParameters
+from mission_control.modules.orders import ModuleOrder, Source, UnitParameters, WrongModule
 from mission_control.modules.os_threads import ThreadRefused, place_thread
 from mission_control.modules.unit_component import UnitComponent
 from mission_control.modules.unit_schedule import Trigger
@@ -270,6 +270,27 @@ async def test_a_long_round_of_an_exchange_is_waited_for_without_a_word(
         HELD.set()
         assert (await swapping).is_proved
         assert "goes on" in await heard.get()
+
+
+async def test_a_new_module_that_hangs_in_its_thread_ends_the_unit_which_starts_again_with_the_old_class(
+    local_mission: Any, beside: Any, hanging: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unit_exchanges, "HANGS_S", 0.1)
+
+    async def until_it_ends() -> None:
+        async with units(local_mission, beside, ORDERS[:1], "same") as (bus, _same), asyncio.timeout(WITHIN_S):
+            HELD.clear()
+            asked = SwapModule("passing", hanging, ready_within_s=1.0)
+            swapping = asyncio.create_task(bus.ask("mission_control/one", asked, Swapped, within_s=WITHIN_S))
+            warms = asyncio.Event()
+            bus.subscribe("mission_control/one", Conversation.LOG, StoryEvent, lambda _one: warms.set())
+            await warms.wait()
+            bus.publish(TESTER, Conversation.EVENTS, Number(1.0))
+            with pytest.raises(WrongModule, match=f"a round with {hanging} has not ended for"):
+                await swapping
+
+    with pytest.raises(RuntimeError, match="a round with"):
+        await until_it_ends()
 
 
 async def test_an_output_that_cannot_be_sent_is_a_bug_of_the_unit_and_does_not_hold_up_the_next() -> None:
