@@ -9,10 +9,12 @@ Rules of this file:
 * The running classes of values (structs and enumerations at the top of the file) stay in use, because other modules
   refer to them. So the file must declare them as before.
 * Only the named file is read anew, not the files that it imports.
+* One file is read at a time, because components of one process may exchange classes of the same file at once.
 """
 
 from __future__ import annotations
 
+import asyncio
 import importlib
 import importlib.machinery
 import importlib.util
@@ -22,6 +24,7 @@ from enum import Enum
 from functools import partial
 from types import ModuleType
 from typing import Generic, TypeVar
+from weakref import WeakKeyDictionary
 
 import msgspec
 
@@ -32,6 +35,8 @@ from backbone.waiting import in_thread_within
 T = TypeVar("T")
 READ_WITHIN_S = 20.0  # chosen: an import of the largest libraries on a busy machine; the command waits for a minute
 HANGS = "Look for a loop or a wait; then end the process, which holds the import: its creator starts it again."
+_turns: WeakKeyDictionary[asyncio.AbstractEventLoop, asyncio.Lock] = WeakKeyDictionary()
+"""Event loop of a process → lock for the reading of files."""
 
 
 class WrongClass(Refusal):
@@ -90,13 +95,14 @@ async def read_anew(class_path: str, load: Callable[[str], T], wrong: type[Wrong
         ValuesChanged: It declares classes of values otherwise.
     """
     file = class_path.partition(":")[0]
-    before = sys.modules.get(file)
-    try:
-        return await in_thread_within(partial(ReadAnew, class_path, load, wrong), READ_WITHIN_S)
-    except TimeoutError:
-        _put_back(file, before)
-        told = f"{class_path}: the import of its file has not ended within {READ_WITHIN_S:g} s"
-        raise wrong(told, remedy=HANGS, class_path=class_path) from None
+    async with _turns.setdefault(asyncio.get_running_loop(), asyncio.Lock()):
+        before = sys.modules.get(file)
+        try:
+            return await in_thread_within(partial(ReadAnew, class_path, load, wrong), READ_WITHIN_S)
+        except TimeoutError:
+            _put_back(file, before)
+            told = f"{class_path}: the import of its file has not ended within {READ_WITHIN_S:g} s"
+            raise wrong(told, remedy=HANGS, class_path=class_path) from None
 
 
 def _read(file: str, before: ModuleType, wrong: type[WrongClass]) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from backbone.reading_anew import ReadAnew, ValuesChanged, WrongClass, read_anew
+from mission_control.modules.module import Module
 from mission_control.modules.orders import load_module_class
 
 PATH = "read_anew_package.inside:One"
@@ -100,6 +102,7 @@ def test_a_file_whose_import_never_ends_is_refused_and_found_as_before(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("backbone.reading_anew.READ_WITHIN_S", 0.2)
+    threads = set(threading.enumerate())
     before = ReadAnew(PATH, load_module_class).kind
     file.write_text(SOURCE + "import sys, threading\nsys.never_set = threading.Event()\nsys.never_set.wait()\n")
     with pytest.raises(WrongClass, match=r"has not ended within 0\.2 s"):
@@ -108,3 +111,19 @@ def test_a_file_whose_import_never_ends_is_refused_and_found_as_before(
     file.write_text(SOURCE.replace("EDITION = 1", "EDITION = 2"))
     assert asyncio.run(read_anew(PATH, load_module_class)).kind is not before
     sys.never_set.set()  # type: ignore[attr-defined]
+    for thread in set(threading.enumerate()) - threads:
+        thread.join()
+
+
+def test_two_classes_of_one_file_that_are_read_at_once_are_both_of_the_present_file(file: Path) -> None:
+    ReadAnew(PATH, load_module_class)
+    text = SOURCE.replace("EDITION = 1", "class Two(One):\n    pass\n\n\nEDITION = 2")
+    file.write_text(text.replace("import msgspec", "import msgspec, time\ntime.sleep(0.2)  # as a large library takes"))
+
+    async def both() -> list[ReadAnew[type[Module]]]:
+        paths = PATH, PATH.replace("One", "Two")
+        return await asyncio.gather(*(read_anew(path, load_module_class) for path in paths))
+
+    read = asyncio.run(both())
+    assert [one.kind.__name__ for one in read] == ["One", "Two"]
+    assert [one.kind().update(None).spot.sizes for one in read] == [[2], [2]]
