@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
@@ -18,6 +19,7 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: for one listener; seconds of the traffic of a busy component
+AT_ONCE_S = 0.01  # chosen: a timer is at most so late by a flood of messages; an honest burst takes less
 GATHER_S = 0.05  # chosen: a component that overhears a mission is woken at most twenty times a second
 
 
@@ -59,11 +61,7 @@ class InboxBus(BusBase):
         """Make the loop call ``act(what)``; called from any thread."""
         self._inbox.append((act, what))
         if not self._woken:
-            self._woken = True
-            try:
-                self._loop.call_soon_threadsafe(self._drain)
-            except RuntimeError:  # the loop is closed
-                log.debug("inbox dropped after the loop's end")
+            self._wake()
 
     def gather(self, act: Callable[[T], None], what: T) -> None:
         """Make the loop call ``act(what)`` within ``GATHER_S``, in one burst with others; called from any thread."""
@@ -75,9 +73,28 @@ class InboxBus(BusBase):
             except RuntimeError:  # the loop is closed
                 log.debug("inbox dropped after the loop's end")
 
+    def _wake(self) -> None:
+        self._woken = True
+        try:
+            self._loop.call_soon_threadsafe(self._drain)
+        except RuntimeError:  # the loop is closed
+            log.debug("inbox dropped after the loop's end")
+
     def _drain(self) -> None:
-        self._woken = self._has_gathering = False
-        for _ in range(len(self._inbox)):
+        """Hand arrivals over for ``AT_ONCE_S``; then the rest of the event loop has its turn before the next ones."""
+        self._woken, self._has_gathering = True, False
+        try:
+            self._hand_over_until(time.monotonic() + AT_ONCE_S)
+        finally:
+            if self._inbox:
+                self._wake()
+            else:
+                self._woken = False
+                if self._inbox and not self._woken:  # another thread pushed in between, and did not wake the loop
+                    self._wake()
+
+    def _hand_over_until(self, end_s: float) -> None:
+        while self._inbox and time.monotonic() < end_s:
             act, what = self._inbox.popleft()
             if self.closed:
                 continue
