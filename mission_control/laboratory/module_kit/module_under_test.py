@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from backbone.errors import Refusal
 from backbone.naming import did_you_mean
-from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, write
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, Reader, write
 from mission_control.modules.module import Module, default_name
 from mission_control.modules.ports import Port, Ports, kinds_of_ports, ports_of, type_name
 
@@ -147,11 +147,13 @@ def _check_class(what: str, port: Port, kind: object, value: object) -> None:
         remedy = "Messages are of exactly the declared class; an output that may be left out has the default None."
         raise ModuleRuleBroken(f"{what} is {type_name(type(value))}, declared is {port.type}", remedy=remedy)
     if is_message and isinstance(value, Message):
-        written = write(Envelope(WIRE_VERSION, "kit/kit", 0, 0.0, "", value))
+        most = MAX_LARGE_MESSAGE_BYTES
         try:
-            same = write(_reader(type(value)).read(written)) == written
-        except Refusal as refusal:
-            raise ModuleRuleBroken(f"{what} cannot cross the bus: {refusal.detail}", remedy=refusal.remedy) from None
+            written = write(Envelope(WIRE_VERSION, "kit/kit", 0, 0.0, "", value), most)
+            same = write(_reader(type(value)).read(written, most), most) == written
+        except (Refusal, TypeError) as error:  # a field of a class that no message may have is a TypeError
+            cause, remedy = (error.detail, error.remedy) if isinstance(error, Refusal) else (str(error), "")
+            raise ModuleRuleBroken(f"{what} cannot cross the bus: {cause}", remedy=remedy) from None
         if not same:
             raise ModuleRuleBroken(f"{what} is not the same after the bus", remedy="Use fields of the declared types.")
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sample_modules import Counter, Doubler, Number, Sum, Summing
 
-from backbone.ranges import Pixels
-from backbone.wire import Message
+from backbone.ranges import Bulk, Pixels
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, Message
 from mission_control.laboratory.module_kit.graph_under_test import GraphUnderTest
 from mission_control.laboratory.module_kit.module_under_test import MakeModule, ModuleRuleBroken, ModuleUnderTest
 from mission_control.modules.graph import GraphRefused
@@ -76,6 +76,11 @@ class CannotCross(Grey):
         return self.Outputs([1], Number("one"))  # type: ignore[arg-type]
 
 
+class SendsMethod(Grey):
+    def update(self, inputs: Any) -> Any:
+        return self.Outputs([1], Number({1.0}.pop))  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("kind", "says"),
     [
@@ -86,6 +91,7 @@ class CannotCross(Grey):
         (LeavesOut, "output row of leaves-out is builtins:NoneType, declared is list"),
         (SaysSomethingElse, "output number of says-something-else is sample_modules:Sum, declared is .*Number"),
         (CannotCross, "output number of cannot-cross cannot cross the bus: .* got `str`"),
+        (SendsMethod, "output number of sends-method cannot cross the bus: Encoding objects of type"),
     ],
 )
 def test_a_broken_rule_is_found(module_under_test: MakeModule, kind: type[Module], says: str) -> None:
@@ -125,6 +131,27 @@ class Inverts(Module):
     def update(self, inputs: Any) -> Any:
         pixels = np.frombuffer(inputs.picture.pixels, np.uint8)
         return self.Outputs(Picture(memoryview(np.subtract(255, pixels, out=pixels if self.in_place else None))))
+
+
+class Map(Message, frozen=True):
+    heights: Bulk
+
+
+class Maps(Module):
+    class Outputs(Module.Outputs):
+        map: Map
+
+    class Parameters(Module.Parameters, frozen=True):
+        bytes: int
+
+    def update(self, inputs: Any) -> Any:
+        return self.Outputs(Map(memoryview(bytes(self.parameters.bytes))))
+
+
+def test_a_large_output_is_as_long_as_a_host_admits(module_under_test: MakeModule) -> None:
+    assert len(module_under_test(Maps(Maps.Parameters(MAX_MESSAGE_BYTES))).update().map.heights) == MAX_MESSAGE_BYTES
+    with pytest.raises(ModuleRuleBroken, match="output map of maps cannot cross the bus: Map of 67108"):
+        module_under_test(Maps(Maps.Parameters(MAX_LARGE_MESSAGE_BYTES))).update()
 
 
 def test_pixels_of_a_message_must_not_be_changed_either(module_under_test: MakeModule) -> None:
