@@ -36,7 +36,7 @@ from backbone.exchange_course import (
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
 from backbone.reading_anew import WrongClass, read_anew
-from backbone.waiting import set_within
+from backbone.waiting import only_bugs, set_within
 from resource_pool.driver_slot import DriverSlot, methods_of
 from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions, driver_class, driver_path
 
@@ -317,7 +317,7 @@ class DriverExchanges:
             return
         try:
             async with asyncio.timeout(CLOSES_WITHIN_S):
-                await close()
+                await only_bugs(close(), f"close of {class_path_of(driver)}")
         except UNPROVED as error:
             log.warning("%s: %s does not close: %s", self._rc.name, class_path_of(driver), complaint(error))
 
@@ -330,7 +330,7 @@ class DriverExchanges:
 
 async def _open(driver: object) -> None:
     opening: Callable[[], Awaitable[None]] = getattr(driver, "open", _nothing)
-    await opening()
+    await only_bugs(opening(), f"open of {class_path_of(driver)}")
 
 
 async def _nothing() -> None:

@@ -19,6 +19,7 @@ from typing import Any
 
 from backbone.errors import Refusal
 from backbone.exchange_course import UNPROVED
+from backbone.waiting import only_bugs
 from resource_pool.drivers.interface import HardwareFault
 
 HANGS_S = 0.2  # chosen: the old driver still has as long until the RC itself gives a call up; machine seconds
@@ -98,7 +99,7 @@ class DriverSlot:
         try:
             given = [self._while_works(driver, one) for one in arguments]
             call: Awaitable[object] = getattr(driver, name)(*given, **named)
-            done = await (_within(HANGS_S, call) if self.is_tried else call)
+            done = await only_bugs(_within(HANGS_S, call) if self.is_tried else call, f"{name} of a driver")
             self.calls += 1
             return done
         except UNPROVED as error:

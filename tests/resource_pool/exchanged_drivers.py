@@ -35,6 +35,13 @@ class First:
             Bench.opened.remove(self.who)
 
 
+async def cut() -> None:
+    """Await a task that this driver has cancelled, which raises ``CancelledError`` here."""
+    reading = asyncio.ensure_future(asyncio.Event().wait())
+    reading.cancel()
+    await reading
+
+
 class Second(First):
     """Another one, which fails as the test says."""
 
@@ -46,6 +53,8 @@ class Second(First):
                 await asyncio.sleep(60.0)
             case "open wrongly":
                 raise ZeroDivisionError
+            case "open cut":
+                await cut()
         await super().open()
 
     async def set_brightness(self, share: float) -> None:
@@ -54,11 +63,21 @@ class Second(First):
                 raise HardwareFault("the lamp is loose")
             case "call wrongly":
                 raise ValueError("planted")
+            case "call cut":
+                await cut()
             case "hang":
                 await asyncio.Event().wait()
             case "task":
                 self.site.fail(OSError("pulled"))
         await super().set_brightness(share)
+
+
+class CutAtItsEnd(First):
+    """Awaits its cancelled task when it is closed."""
+
+    async def close(self) -> None:
+        await super().close()
+        await cut()
 
 
 class Sticky(First):

@@ -42,7 +42,7 @@ class OpenedLamp(Lamp):
 
 
 PAIRS = [("First", "Second"), ("FirstBeside", "SecondBeside")]
-FAULTS = ["open", "open late", "open wrongly", "call", "call wrongly", "hang", "task"]
+FAULTS = ["open", "open late", "open wrongly", "open cut", "call", "call wrongly", "call cut", "hang", "task"]
 
 
 @pytest.fixture(autouse=True)
@@ -106,6 +106,7 @@ def test_the_old_driver_does_what_the_new_one_cannot(local_mission: Any, old: st
             await shine(pool, 0.7)
         swapped = await swapping
         cause = {"open late": "not open", "open wrongly": "Zero", "call wrongly": "planted", "hang": "longer"}
+        cause |= dict.fromkeys(("open cut", "call cut"), "raised CancelledError")
         assert not swapped.is_proved
         assert cause.get(fault, {"open": "no such", "call": "loose", "task": "pulled"}.get(fault, "")) in swapped.cause
         assert Bench.opened == [old]
@@ -116,6 +117,15 @@ def test_the_old_driver_does_what_the_new_one_cannot(local_mission: Any, old: st
         assert (await swap(pool, new)).is_proved
 
     bench(local_mission, old, scene)
+
+
+def test_an_old_driver_that_awaits_its_cancelled_task_when_it_is_closed_holds_up_nothing(local_mission: Any) -> None:
+    async def scene(pool: Pool) -> None:
+        assert (await swap(pool, "Second")).is_proved
+        await shine(pool, 0.7)
+        assert Bench.shone[-1] == ("Second", 0.7)
+
+    bench(local_mission, "CutAtItsEnd", scene)
 
 
 def test_an_old_driver_that_hangs_when_it_is_opened_again_ends_the_rc(local_mission: Any) -> None:
