@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from backbone.recording.reader import Recording
 from backbone.recording.recorded_mission import HISTORY, STATES, RecordedMission
+from backbone.recording.writer import NS
 from backbone.wire import Message
 
 EACH_S = 30.0  # chosen: the messages of half a minute are read within a second
@@ -38,7 +39,7 @@ class Checkpoints:
         contents = recording.contents()
         each_s = max(EACH_S, (contents.end_s - contents.begin_s) / MOST)
         next_s, last_s = max(since_s, contents.begin_s) + each_s, -math.inf
-        until_s = math.nextafter(at_s, -math.inf)
+        until_s = (round(at_s * NS) - 1) / NS  # a recording counts whole nanoseconds
         for message in recording.messages(_KNOWN, max(0.0, since_s), until_s):
             if message.at_s >= next_s and message.at_s > last_s:
                 self._keep(message.at_s, mission)

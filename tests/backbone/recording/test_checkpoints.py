@@ -19,12 +19,13 @@ from backbone.component.messages import (
 )
 from backbone.errors import Refusal
 from backbone.keys import Conversation
-from backbone.mission_log.log import AskLog
+from backbone.mission_log.log import AskLog, Log
 from backbone.nameserver.messages import ListComponents
 from backbone.recording.checkpoints import EACH_S, Checkpoints
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
 from backbone.recording.recorded_mission import RecordedMission
+from backbone.recording.writer import NS
 from backbone.wire import Message
 
 LAST_S = 5 * EACH_S
@@ -69,3 +70,14 @@ def test_from_a_checkpoint_or_from_the_begin_a_mission_is_the_same(said: list[tu
     for at_s in looks:
         fresh = Checkpoints(CLASSES).mission_at(recording, at_s)
         assert told(checkpoints.mission_at(recording, at_s)) == told(fresh)
+
+
+@given(times=st.lists(st.integers(0, 10**12), min_size=1, max_size=8), data=st.data())
+def test_messages_of_the_asked_instant_itself_are_not_known_yet(times: list[int], data: st.DataObject):
+    ordered = [each / NS for each in sorted(times)]
+    events = [messages(at_s, "event", number) for number, at_s in enumerate(ordered)]
+    recording = Recording(recorded([one for said in events for one in said]))
+    at_s = data.draw(st.sampled_from(ordered))
+    log = Checkpoints(CLASSES).mission_at(recording, at_s).answer(LAUNCHER, AskLog())
+    assert isinstance(log, Log)
+    assert [event.what for event in log.events] == [str(number) for number, one in enumerate(ordered) if one < at_s]
