@@ -10,6 +10,7 @@ import math
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from itertools import zip_longest
 from typing import Any
 
@@ -17,6 +18,15 @@ from backbone.recording.reader import Recorded
 
 Named = tuple[str, str, str]
 """Key without ``scout/<mission>/``, sender, schema."""
+
+
+class Absent(StrEnum):
+    """What stands in place of a value that one recording lacks; null is a value, such as of a number that was NaN."""
+
+    ABSENT = "absent"
+
+
+ABSENT = Absent.ABSENT
 
 
 @dataclass(slots=True)
@@ -54,8 +64,8 @@ class Difference:
         first_s: Its mission time in the first recording.
         second_s: Its mission time in the second.
         field: Path of the first field that differs, as ``rcs.0.rc``.
-        first: Value of the field in the first recording; None: the field is absent.
-        second: Value of the field in the second.
+        first: Value of the field in the first recording, or ``ABSENT``.
+        second: Value of the field in the second, or ``ABSENT``.
     """
 
     number: int
@@ -138,11 +148,12 @@ def _unequal(first: Any, second: Any, path: str) -> Iterator[tuple[str, Any, Any
     """Yield the paths at which two bodies differ, with both values."""
     if isinstance(first, dict) and isinstance(second, dict):
         for name in dict.fromkeys((*first, *second)):
-            yield from _unequal(first.get(name), second.get(name), f"{path}.{name}" if path else name)
+            inner = f"{path}.{name}" if path else name
+            yield from _unequal(first.get(name, ABSENT), second.get(name, ABSENT), inner)
     elif isinstance(first, list) and isinstance(second, list):
-        for place, (one, other) in enumerate(zip_longest(first, second)):
+        for place, (one, other) in enumerate(zip_longest(first, second, fillvalue=ABSENT)):
             yield from _unequal(one, other, f"{path}.{place}" if path else str(place))
-    elif first != second:
+    elif first != second or isinstance(first, bool) is not isinstance(second, bool):  # True equals 1
         yield path, first, second
 
 

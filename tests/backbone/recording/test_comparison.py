@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.recording.comparison import compared
+from backbone.recording.comparison import ABSENT, compared
 from backbone.recording.reader import Recorded
 
 KEYS = ("resource_pool/scout1/readings", "resource_pool/scout2/readings")
@@ -75,6 +75,22 @@ def test_errors_of_numbers_are_their_largest_and_mean_square_distance(first: lis
         {"x": max(apart)},
     )
     assert all(one.is_same for one in within.values())
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "field", "values"),
+    [
+        ({"x": [1.0, None]}, {"x": [1.0]}, "x.1", (None, ABSENT)),  # a scan that ends with NaN, and a shorter one
+        ({"x": 1}, {"x": 1, "y": None}, "y", (ABSENT, None)),
+        ({"x": True}, {"x": 1}, "x", (True, 1)),
+    ],
+)
+def test_null_is_not_absent_and_true_is_not_one(
+    first: dict[str, Any], second: dict[str, Any], field: str, values: tuple[object, object]
+):
+    [found] = compared(messages([(KEYS[0], first)]), messages([(KEYS[0], second)])).values()
+    assert found.difference is not None
+    assert (found.difference.field, found.difference.first, found.difference.second) == (field, *values)
 
 
 def test_a_message_more_is_a_difference_in_number():
