@@ -129,6 +129,8 @@ async def record_to(
     say(f"{path}: {counted(recorder.written, 'message')}")
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
+    if recorder.deleted:
+        say(f"incomplete: {counted(recorder.deleted, 'message')} were in a file that was deleted meanwhile")
     if recorder.was_started_again:
         say("the recording ended because the mission was started again")
     if recorder.full:

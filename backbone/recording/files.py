@@ -31,6 +31,11 @@ class RecordingFiles:
         """Path of the open file."""
         self.file: IO[bytes] = self._open()
 
+    @property
+    def is_deleted(self) -> bool:
+        """Whether the open file was deleted; then all that is written to it is lost."""
+        return not self.file.closed and os.fstat(self.file.fileno()).st_nlink == 0
+
     def open_next(self) -> None:
         """Close the file and open the next one; names of existing files are skipped.
 

@@ -113,13 +113,15 @@ class Recorder:
         """True: it ended because a later mission of the same name is up."""
         self.on_flushed: Callable[[], None] = lambda: None
         """Called after each flush; settable."""
+        self.deleted = 0
+        """Number of messages that were lost because a person deleted the file that was being written."""
         self.full = ""
         """Reason why the file cannot grow; empty: it can."""
 
     @property
     def written(self) -> int:
-        """Number of recorded messages so far."""
-        return self._before + self._writer.written
+        """Number of recorded messages so far, without the deleted ones."""
+        return self._before + self._writer.written - self.deleted
 
     @property
     def dropped(self) -> int:
@@ -206,7 +208,7 @@ class Recorder:
             self._writer.flush()
             if shutil.disk_usage(self._files.path.parent).free < LEAST_FREE_BYTES:
                 self._fill(f"less than {LEAST_FREE_BYTES // 1_000_000} MB are free")
-            elif self._is_long:
+            elif self._note_deletion() or self._is_long:
                 self._split()
         except OSError as error:
             self._fill(str(error))
@@ -216,10 +218,19 @@ class Recorder:
         lasted_s = (self._clock.now_s() - self._begun_s) / self._clock.rate
         return lasted_s >= self._split_s or self._files.file.tell() >= self._split_bytes
 
+    def _note_deletion(self) -> bool:
+        """Return whether the open file was deleted; if so, count its messages as lost, and log it."""
+        if self.full or not self._files.is_deleted:
+            return False
+        self.deleted += self._writer.written
+        lost = f"{self._files.path.name} was deleted while it was recorded to"
+        self._say(f"{lost}; {counted(self._writer.written, 'message')} are lost", LogLevel.ALARM)
+        return True
+
     def _split(self) -> None:
         self._writer.finish()
         self._files.open_next()
-        self._before, self._begun_s = self.written, self._clock.now_s()
+        self._before, self._begun_s = self._before + self._writer.written, self._clock.now_s()
         self._writer = self._new_writer()
         self._needs_snapshot.set()
 
@@ -237,6 +248,7 @@ class Recorder:
             subscribed.close()
         try:
             self._writer.finish()
+            self._note_deletion()
             self._files.close()
         except OSError as error:
             self._fill(str(error))
