@@ -126,13 +126,13 @@ class _OwnThread(Executor):
         return outcome
 
 
-async def in_thread_within(work: Callable[[], T], within_s: float) -> T:
+async def in_thread_within(work: Callable[[], T], within_s: float | None) -> T:
     """Return what the work returns, done in a thread of its own while the event loop goes on.
 
     Work that hangs holds up neither who waits nor the end of the process: its thread is left to itself.
 
     Raises:
-        TimeoutError: It takes longer than these seconds of the machine.
+        TimeoutError: It takes longer than these seconds of the machine; None: it may take for ever.
     """
     done = partial(contextvars.copy_context().run, work)
     async with asyncio.timeout(within_s):

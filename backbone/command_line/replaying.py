@@ -44,7 +44,7 @@ from backbone.recording.rerun import RealComponent, classes_of, launch_of, run_a
 from backbone.recording.revival import with_names
 from backbone.scheduling.events import Record
 from backbone.spoken import counted
-from backbone.waiting import first_to_end
+from backbone.waiting import first_to_end, in_thread_within
 from backbone.wire import Message, plain
 
 REPLAY = "replay"
@@ -217,9 +217,19 @@ async def _play_to_end(player: Player) -> None:
 async def _asked_for_step(message: Recorded) -> None:
     """Print the next message, and return when a line was read."""
     show([message_line(message)])
-    line = await asyncio.to_thread(sys.stdin.readline)
-    if not line:
+    if not await in_thread_within(_read_line, None):
         await asyncio.Event().wait()
+
+
+def _read_line() -> bytes:
+    """Return the next line from standard input; empty: it has ended.
+
+    Python's own reader would hold its lock while the process ends, which then aborts.
+    """
+    line = b""
+    while not line.endswith(b"\n") and (one := os.read(sys.stdin.fileno(), 1)):
+        line += one
+    return line
 
 
 def _lines(difference: OtherDecision) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -74,3 +75,14 @@ def test_in_steps_each_line_of_input_plays_the_next_message(recording: Path) -> 
             assert f'"{what}"' in player.stdout.readline()
             player.stdin.write("\n")
             player.stdin.flush()
+
+
+@pytest.mark.parametrize("order", [signal.SIGINT, signal.SIGTERM])
+def test_a_step_that_is_awaited_holds_up_no_end(recording: Path, order: signal.Signals) -> None:
+    with replay(recording, "--step") as player:
+        assert player.stdout is not None
+        assert player.stderr is not None
+        player.stdout.readline()
+        player.send_signal(order)
+        assert player.wait(20) == 0
+        assert player.stderr.read() == ""
