@@ -103,7 +103,9 @@ class Recorder:
         self._writer, self._before = self._new_writer(), 0
         self._begun_s = clock.now_s()
         self._subscribed: list[Overhearing] = []
-        self._appeared: asyncio.Queue[str] = asyncio.Queue()
+        self._present: dict[str, None] = {}
+        self._to_ask: dict[str, None] = {}
+        self._needs_asking = asyncio.Event()
         self._awaited, self._was_told = frozenset[str](), asyncio.Event()
         self._bug: BaseException | None = None
         self._one_at_a_time, self._needs_snapshot = asyncio.Lock(), asyncio.Event()
@@ -233,6 +235,8 @@ class Recorder:
         self._before, self._begun_s = self._before + self._writer.written, self._clock.now_s()
         self._writer = self._new_writer()
         self._needs_snapshot.set()
+        for address in tuple(self._present):  # each file tells by itself who is there, and in which state
+            self._alive_changed(address, alive=True)
 
     def _new_writer(self) -> RecordingWriter:
         return RecordingWriter(self._files.file, *self._facts)
@@ -279,7 +283,10 @@ class Recorder:
         raw = write(Envelope(WIRE_VERSION, "", 0, now_s, "", Presence(alive)))
         self._heard(key_of(self._bus.mission, address, Conversation.ALIVE), raw)
         if alive:
-            self._appeared.put_nowait(address)
+            self._present[address] = self._to_ask[address] = None
+            self._needs_asking.set()
+        else:
+            self._present.pop(address, None)
 
     @property
     def _who(self) -> str:
@@ -325,7 +332,11 @@ class Recorder:
 
     async def _ask_who_appears(self) -> None:
         while True:
-            address = await self._appeared.get()
+            while not self._to_ask:
+                self._needs_asking.clear()
+                await self._needs_asking.wait()
+            address = next(iter(self._to_ask))
+            del self._to_ask[address]
             if address == RC_MANAGER:
                 self._needs_snapshot.set()
                 await self._asked(address, AskSchedule(), Schedule)

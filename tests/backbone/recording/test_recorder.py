@@ -13,8 +13,22 @@ import pytest
 
 from backbone.addresses import NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.component.messages import AskStory, AskTime, LogLevel, MissionTime, Story, StoryEvent
+from backbone.component.messages import (
+    AskParameters,
+    AskState,
+    AskStory,
+    AskTime,
+    ComponentState,
+    LifeState,
+    LogLevel,
+    MissionTime,
+    Parameters,
+    Story,
+    StoryEvent,
+)
 from backbone.keys import Conversation
+from backbone.nameserver.messages import Components, ListComponents
+from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.files import RecordingFiles
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recorded, Recording, missing_numbers
@@ -233,6 +247,42 @@ def test_a_long_recording_goes_on_in_further_files(
     else:
         assert (found[0], held) == (1, written[0])
         assert len(paths) > 3
+
+
+def test_each_further_file_tells_by_itself_who_is_there_and_in_which_state(tmp_path: Path, local_mission: Any) -> None:
+    async def answer(asked: Envelope[Any]) -> ComponentState | Parameters | Story:
+        match asked.body:
+            case AskState():
+                return ComponentState("resource_pool/scout1", "scout", "base", 7, LifeState.READY, 0.5, "stands")
+            case AskParameters():
+                return Parameters({"speed": 1})
+        return Story([])
+
+    async def play() -> None:
+        clock = VirtualClock()
+        async with local_mission("local") as network:
+            bus, scout = network.join("backbone/recorder", clock), network.join("resource_pool/scout1", clock)
+            gone = network.join("resource_pool/scout2", clock)
+            for one in (scout, gone):
+                one.serve(one.source, AskState | AskParameters | AskStory, answer)
+                one.declare_alive(one.source)
+            files = RecordingFiles(tmp_path / "it.mcap")
+            recorder = Recorder(bus, clock, files=files, split_s=1.0, classes=CLASSES, about={})
+            running = asyncio.create_task(recorder.run())
+            await clock.sleep_s(0.5)
+            await gone.close()
+            await clock.sleep_s(1.4)
+            recorder.end()
+            await running
+            await bus.close()
+
+    run_virtual(play())
+    with (tmp_path / "it-2.mcap").open("rb") as file:
+        mission = Checkpoints(CLASSES).mission_at(Recording(file), 10.0)
+    listed = mission.answer(NAMESERVER, ListComponents())
+    assert isinstance(listed, Components)
+    assert [one.address for one in listed.components] == [NAMESERVER, "resource_pool/scout1"]
+    assert mission.answer("resource_pool/scout1", AskParameters()) == Parameters({"speed": 1})
 
 
 def test_if_no_further_file_can_be_opened_it_ends_with_a_whole_file_and_says_so(
