@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 from backbone.component.messages import Absence, ComponentState
-from backbone.keys import Conversation
+from backbone.keys import Conversation, address_of
 from backbone.nameserver.messages import UnknownName
 from backbone.naming import component_of, did_you_mean
 from backbone.picture.health import MissionHealth
 from backbone.picture.reasons import AskedName, Reasons
 from backbone.printable import printable_all
 from backbone.recording.decisions import NotRecorded, schedule_at
+from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
 from backbone.recording.revival import revived
 from backbone.scheduling.explain.answers import Answers
@@ -17,7 +20,7 @@ from backbone.scheduling.requests import UnknownRequest
 from backbone.scheduling.views import Why
 from backbone.wire import schema_of
 
-_SAID = tuple(f"*/{said}" for said in (Conversation.STATUS, Conversation.HEALTH, Conversation.ASK))
+_SAID = tuple(f"*/{said}" for said in (Conversation.STATUS, Conversation.HEALTH, Conversation.ASK, Conversation.ALIVE))
 
 
 def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
@@ -29,9 +32,9 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
         NoSnapshot, OtherForm: The recording is of another release.
     """
     name = AskedName.of(text).name
-    states, absent = _last_said(recording, at_s)
-    component = states.get(name)
-    absence = next((one for one in absent if one.name == name), None)
+    said = _last_said(recording, at_s)
+    component = said.states.get(name)
+    absence = next((one for one in said.absent if one.name == name), None)
     try:
         why = _why(recording, name, at_s)
     except NotRecorded:
@@ -39,9 +42,15 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
             raise
         why = None
     if why is None and component is None and absence is None:
-        hint = did_you_mean(name, states)
+        hint = did_you_mean(name, said.states)
         raise UnknownName(f"the recording has nothing about {name!r} before {at_s:.3f} s{hint}", name=name)
-    return printable_all(Reasons(name, why, None, component, absence))
+    if component is None or name not in said.left_s:
+        return printable_all(Reasons(name, why, None, component, absence))
+    doing = f": {component.feedback}" if component.feedback else ""
+    before = f"before, it was {component.state} on {component.host}{doing}"
+    return printable_all(
+        Reasons(name, why, None, None, absence, remarks=[f"{name} left the bus at {said.left_s[name]:.3f} s; {before}"])
+    )
 
 
 def _why(recording: Recording, name: str, at_s: float) -> Why | None:
@@ -52,14 +61,32 @@ def _why(recording: Recording, name: str, at_s: float) -> Why | None:
         return None
 
 
-def _last_said(recording: Recording, at_s: float) -> tuple[dict[str, ComponentState], list[Absence]]:
-    """Return the last published state of each component by name, and the last published absences."""
-    states: dict[str, ComponentState] = {}
-    absent: list[Absence] = []
+@dataclass(slots=True)
+class _LastSaid:
+    """What components last said before a time.
+
+    Attributes:
+        states: Component → its last state.
+        left_s: Component whose token has fallen, and not risen again → the mission time of the fall.
+        absent: The last published absences.
+    """
+
+    states: dict[str, ComponentState] = field(default_factory=dict)
+    left_s: dict[str, float] = field(default_factory=dict)
+    absent: list[Absence] = field(default_factory=list)
+
+
+def _last_said(recording: Recording, at_s: float) -> _LastSaid:
+    said = _LastSaid()
     for message in recording.messages(_SAID, 0.0, at_s):
         if message.schema == schema_of(ComponentState):
             state = revived(ComponentState, message.body)
-            states[component_of(state.address)] = state
+            said.states[component_of(state.address)] = state
         elif message.schema == schema_of(MissionHealth):
-            absent = revived(MissionHealth, message.body).absent
-    return states, absent
+            said.absent = revived(MissionHealth, message.body).absent
+        elif message.schema == schema_of(Presence):
+            name = component_of(address_of(message.key))
+            said.left_s.pop(name, None)
+            if not revived(Presence, message.body).alive:
+                said.left_s[name] = message.at_s
+    return said
