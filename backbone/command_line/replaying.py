@@ -89,9 +89,15 @@ async def run_without(
 
 
 async def print_reasons_at(path: Path, name: str, at_s: float | None, *, as_json: bool) -> ExitCode:
-    """Print the reasons for a state at a mission time; None: at the end."""
+    """Print the reasons for a state at a mission time; None: at the end.
+
+    Raises:
+        NoSuchTime: The recording had ended.
+    """
     with opened(path) as recording:
-        asked_s = recording.contents().end_s if at_s is None else at_s
+        found = recording.contents()
+        asked_s = found.end_s if at_s is None else at_s
+        _require_recorded(asked_s, found)
         reasons = reasons_at(recording, name, asked_s)
     show([json.dumps({"at_s": asked_s} | reasons.to_json())] if as_json else reasons.lines(asked_s))
     return ExitCode.DONE
@@ -146,8 +152,7 @@ async def _play_in(
     directory: Path, name: str, path: Path, recording: Recording, found: Contents, wanted: Playing
 ) -> None:
     since_s = found.begin_s if wanted.since_s is None else wanted.since_s
-    if since_s > found.end_s:
-        raise NoSuchTime(f"the recording ends at {found.end_s:.3f} s")
+    _require_recorded(since_s, found)
     endpoint, clock = socket_endpoint(directory), PunctualClock(time.monotonic() - since_s / wanted.speed, wanted.speed)
     bus = await ZenohBus.open_when_up(name, f"{Subsystem.BACKBONE}/{REPLAY}", clock, hub_config([endpoint]))
     ended, loop = asyncio.Event(), asyncio.get_running_loop()
@@ -187,6 +192,16 @@ async def _play_in(
     finally:
         gc.enable()
         await bus.close()
+
+
+def _require_recorded(at_s: float, found: Contents) -> None:
+    """Return if the recording has not ended by this mission time.
+
+    Raises:
+        NoSuchTime: It has ended.
+    """
+    if at_s > max(found.end_s, round(found.end_s, 3)):  # 'recording info' rounds it
+        raise NoSuchTime(f"the recording ends at {found.end_s:.3f} s")
 
 
 def _announce(bus: Bus, clock: Clock, what: str) -> None:

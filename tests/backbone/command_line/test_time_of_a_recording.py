@@ -1,0 +1,40 @@
+"""A time after the end of a recording is refused: what was then is not known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from small_recordings import SCOUT, Said, recorded
+
+from backbone.command_line.replaying import Playing, play, print_reasons_at
+from backbone.component.messages import ComponentState, LifeState
+from backbone.keys import Conversation
+from backbone.launcher.endings import ExitCode
+from backbone.recording.playback import NoSuchTime
+
+END_S, SHOWN_END_S, AFTERWARDS_S = 2.0006, 2.001, 2.0015
+
+
+@pytest.fixture
+def night(tmp_path: Path) -> Path:
+    path = tmp_path / "night.mcap"
+    state = ComponentState(SCOUT, "scout", "base", 7, LifeState.READY, 0.5, "drives")
+    path.write_bytes(recorded([Said(at_s, SCOUT, Conversation.STATUS, state) for at_s in (1.0, END_S)]).getvalue())
+    return path
+
+
+@pytest.mark.parametrize("at_s", [None, 1.0, END_S, SHOWN_END_S])
+async def test_until_its_end_as_info_prints_it_reasons_are_told(
+    night: Path, at_s: float | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert await print_reasons_at(night, "scout1", at_s, as_json=False) is ExitCode.DONE
+    assert "scout1 is ready on base: drives" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("at_s", [AFTERWARDS_S, 1000.0])
+async def test_afterwards_no_reasons_are_told_and_nothing_is_played(night: Path, at_s: float) -> None:
+    with pytest.raises(NoSuchTime, match=r"ends at 2\.001 s"):
+        await print_reasons_at(night, "scout1", at_s, as_json=False)
+    with pytest.raises(NoSuchTime, match=r"ends at 2\.001 s"):
+        await play(night, Playing("late", at_s, 1.0, is_stepped=False, keys=()))
