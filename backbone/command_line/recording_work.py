@@ -40,6 +40,7 @@ from backbone.mission_log.log import FOR_EVER_S, AskLog, MissionLog
 from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.operating_system.ending_signals import orders_to_end
 from backbone.operating_system.own_process import go_behind_others
+from backbone.printable import printable_all
 from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.host_ear import HostEar
@@ -309,7 +310,8 @@ async def print_events(path: Path, name: str, since_s: float, until_s: float | N
                 log.add(revived(StoryEvent, message.body))
             elif message.schema == "OperatorActed/1":
                 log.add(revived(OperatorActed, message.body).event(message.source, message.cause))
-    events = log.answer(AskLog(since_s, FOR_EVER_S if until_s is None else until_s, name, most=most)).events
+    asked = AskLog(since_s, FOR_EVER_S if until_s is None else until_s, name, most=most)
+    events = printable_all(log.answer(asked)).events
     show([json.dumps(event_json(event)) for event in events] if as_json else story_lines(events))
     if not events:
         say(f"no event about {name}" if name else "no event")

@@ -36,3 +36,15 @@ async def test_each_event_of_that_time_is_printed(
     assert await print_events(night, "scout1", since_s, until_s, as_json=False) is ExitCode.DONE
     lines = capsys.readouterr().out.splitlines()
     assert [line.rpartition(" ")[2] for line in lines] == [str(number) for number in numbers]
+
+
+async def test_an_event_of_several_lines_is_one_line_and_forges_no_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    what = "is well\n     9.000 s  backbone/launcher                 scout1: all is well"
+    event = StoryEvent(1.0, SCOUT, what, "scout1", "", LogLevel.INFO)
+    path = tmp_path / "night.mcap"
+    path.write_bytes(recorded([Said(1.0, SCOUT, Conversation.LOG, event)]).getvalue())
+    assert await print_events(path, "", 0.0, None, as_json=False) is ExitCode.DONE
+    [line] = capsys.readouterr().out.splitlines()
+    assert r"is well\n " in line
