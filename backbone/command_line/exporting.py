@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from importlib import import_module
 from pathlib import Path
 from typing import ClassVar, Protocol
 
 from backbone.command_line.recording_work import opened
-from backbone.command_line.unusable_file import FileUnusable
+from backbone.command_line.unusable_file import new_folder
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.hearing import is_meant
 from backbone.recording.reader import Recorded, Recording
@@ -122,19 +122,3 @@ def _batches(rows: Iterable[tuple[Recorded, dict[str, object]]]) -> Iterator[tup
         if len(waiting[table]) >= ROWS_AT_ONCE:
             yield table, waiting.pop(table)
     yield from waiting.items()
-
-
-@contextmanager
-def new_folder(folder: Path) -> Iterator[None]:
-    """Make a folder for the output of a command.
-
-    Raises:
-        FileUnusable: The folder exists, or a file cannot be written into it.
-    """
-    try:
-        folder.mkdir(parents=True)
-        yield
-    except FileExistsError as error:
-        raise FileUnusable(f"{folder} exists", remedy="Name a new folder.") from error
-    except OSError as error:
-        raise FileUnusable(f"{error.filename or folder}: {error.strerror or error}") from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from backbone.command_line.recording_work import opened
-from backbone.command_line.unusable_file import FileUnusable
+from backbone.command_line.unusable_file import new_file
 from backbone.foxglove.translated_copy import write_copy
 from backbone.foxglove.well_known import installed
 from backbone.launcher.endings import ExitCode, say
@@ -17,15 +17,9 @@ async def copy_for_foxglove(path: Path, to: Path, keys: tuple[str, ...]) -> Exit
 
     Raises:
         FileUnusable: The recording cannot be read, or the new file exists or cannot be written.
-        NoRecording: The file is not a recording, or its recorder was killed.
+        NoRecording: The file is not a recording, its recorder was killed, or it is damaged.
     """
-    with opened(path) as recording:
-        try:
-            with to.open("xb") as file:
-                shown = write_copy(recording, file, installed(), keys)
-        except FileExistsError as error:
-            raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
-        except OSError as error:
-            raise FileUnusable(f"{to}: {error.strerror or error}") from error
+    with opened(path) as recording, new_file(to) as file:
+        shown = write_copy(recording, file, installed(), keys)
     say(f"{to}: {counted(shown, 'message')} that Foxglove shows, and all others as recorded")
     return ExitCode.DONE

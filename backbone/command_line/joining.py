@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from backbone.command_line.event_loop import interruptible
-from backbone.command_line.unusable_file import FileUnusable
+from backbone.command_line.unusable_file import FileUnusable, new_file
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.clock_offsets import ClockOffsets, Offset
-from backbone.recording.joining import Joined, join
+from backbone.recording.joining import join
 from backbone.recording.reader import NoRecording, Recording, open_file
 from backbone.spoken import counted
 
@@ -26,26 +26,13 @@ async def join_to(paths: Sequence[Path], to: Path) -> ExitCode:
     """
     with interruptible(), ExitStack() as stack:
         recordings = {str(path): _opened(path, stack) for path in paths}
-        joined = _join(recordings, to)
+        file = stack.enter_context(new_file(to))
+        joined = join(recordings, file)
     copies = f"; {joined.left_out} that several recorders heard stand once" if joined.left_out else ""
     say(f"{to}: {counted(joined.messages, 'message')}{copies}")
     for line in clock_lines(joined.clocks):
         say(f"{line}; corrected in {to.name}")
     return ExitCode.DONE
-
-
-def _join(recordings: Mapping[str, Recording], to: Path) -> Joined:
-    try:
-        with to.open("xb") as file:
-            try:
-                return join(recordings, file)
-            except BaseException:
-                to.unlink()
-                raise
-    except FileExistsError as error:
-        raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
-    except OSError as error:
-        raise FileUnusable(f"{to}: {error.strerror or error}") from error
 
 
 def _opened(path: Path, stack: ExitStack) -> Recording:

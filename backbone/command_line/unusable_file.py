@@ -1,6 +1,12 @@
-"""The refusal of a file that a command cannot use."""
+"""The refusal of a file that a command cannot use; new files and folders, which exist only if they are complete."""
 
 from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
 
 from backbone.errors import Refusal
 
@@ -10,3 +16,44 @@ class FileUnusable(Refusal):
 
     code = "usage.file"
     remedy = "Name a file that this user may read, or a new file in a folder where this user may write."
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[IO[bytes]]:
+    """Make a file for the output of a command; if the block fails or is interrupted, the file is removed.
+
+    Raises:
+        FileUnusable: The file exists, or cannot be written.
+    """
+    try:
+        with path.open("xb") as file:
+            try:
+                yield file
+                file.flush()
+            except BaseException:
+                path.unlink()
+                raise
+    except FileExistsError as error:
+        raise FileUnusable(f"{path} exists", remedy="Name a new file.") from error
+    except OSError as error:
+        raise FileUnusable(f"{path}: {error.strerror or error}") from error
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[None]:
+    """Make a folder for the output of a command; if the block fails or is interrupted, the folder is removed.
+
+    Raises:
+        FileUnusable: The folder exists, or a file cannot be written into it.
+    """
+    try:
+        folder.mkdir(parents=True)
+        try:
+            yield
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+    except FileExistsError as error:
+        raise FileUnusable(f"{folder} exists", remedy="Name a new folder.") from error
+    except OSError as error:
+        raise FileUnusable(f"{error.filename or folder}: {error.strerror or error}") from error

@@ -32,26 +32,24 @@ def write_copy(recording: Recording, to: IO[bytes], translations: Translations, 
         keys: Only messages of keys that match one of these; none: all.
 
     Raises:
-        NoRecording: The recording is damaged; the messages before the damage are written.
+        NoRecording: The recording is damaged; the copy is not complete.
     """
     classes = {schema_of(kind): kind for kind in translations}
     writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
     writer.start(profile="", library=PROFILE)
     writer.add_metadata(ABOUT, recording.contents().about)
     channels, shown = _Channels(writer), 0
-    try:
-        for schema, channel, message, recorded in recording.records(keys):
-            at_ns = message.log_time
-            views = shown_as(message_as_sent(classes, recorded), translations)
-            for one in views:
-                number = channels.shown(one.topic, one.message.get_schema())
-                writer.add_message(number, at_ns, one.message.encode(), message.publish_time)
-            shown += len(views)
-            if not any(one.is_all for one in views):
-                number = channels.as_recorded(channel, schema)
-                writer.add_message(number, at_ns, message.data, message.publish_time, message.sequence)
-    finally:
-        writer.finish()  # type: ignore[no-untyped-call]
+    for schema, channel, message, recorded in recording.records(keys):
+        at_ns = message.log_time
+        views = shown_as(message_as_sent(classes, recorded), translations)
+        for one in views:
+            number = channels.shown(one.topic, one.message.get_schema())
+            writer.add_message(number, at_ns, one.message.encode(), message.publish_time)
+        shown += len(views)
+        if not any(one.is_all for one in views):
+            number = channels.as_recorded(channel, schema)
+            writer.add_message(number, at_ns, message.data, message.publish_time, message.sequence)
+    writer.finish()  # type: ignore[no-untyped-call]
     return shown
 
 

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from full_disk import disk_full_at
 from mcap.writer import Writer
 from small_recordings import SCOUT, Said, recorded
 
-from backbone.command_line import comparing, event_loop, joining, recording_work, replaying
+from backbone.command_line import comparing, event_loop, exporting, foxglove_copy, joining, recording_work, replaying
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
+from backbone.launcher.endings import ExitCode
 from backbone.recording import reader
 
 MESSAGES, READ = 100, 10
@@ -59,8 +61,10 @@ def read(night: Path, monkeypatch: pytest.MonkeyPatch) -> list[object]:
         recording_work.recover_to,
         lambda night, new: joining.join_to([night], new),
         lambda night, _new: replaying.play(night, ALL),
+        lambda night, new: exporting.export(night, new, (), exporting.CsvTables, with_videos=False),
+        lambda night, new: foxglove_copy.copy_for_foxglove(night, new, ()),
     ],
-    ids=["check", "story", "compare", "recover", "join", "replay"],
+    ids=["check", "story", "compare", "recover", "join", "replay", "export", "foxglove"],
 )
 def test_it_ends_at_once_and_leaves_nothing(
     command: Command, night: Path, read: list[object], tmp_path: Path, short_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -82,3 +86,30 @@ def test_where_a_shell_ignores_ctrl_c_it_stays_ignored() -> None:
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+NEW: list[Command] = [
+    lambda night, new: joining.join_to([night], new),
+    lambda night, new: exporting.export(night, new, (), exporting.CsvTables, with_videos=False),
+    lambda night, new: foxglove_copy.copy_for_foxglove(night, new, ()),
+]
+names_of_new = pytest.mark.parametrize("command", NEW, ids=["join", "export", "foxglove"])
+
+
+@names_of_new
+def test_what_finds_no_room_leaves_nothing_and_can_be_repeated(command: Command, night: Path, tmp_path: Path) -> None:
+    new = tmp_path / "new.mcap"
+    with disk_full_at(1000):
+        assert event_loop.exit_code_of(lambda: command(night, new)) == ExitCode.USAGE
+    assert not new.exists()
+    assert event_loop.exit_code_of(lambda: command(night, new)) == ExitCode.DONE
+
+
+@names_of_new
+def test_of_a_damaged_recording_no_copy_is_left_that_looks_whole(command: Command, night: Path, tmp_path: Path) -> None:
+    data = bytearray(night.read_bytes())
+    data[len(data) // 4] ^= 0xFF
+    night.write_bytes(data)
+    new = tmp_path / "new.mcap"
+    assert event_loop.exit_code_of(lambda: command(night, new)) == ExitCode.REFUSED
+    assert not new.exists()
