@@ -79,7 +79,7 @@ async def run_without(
             say(f"runs {launch.class_path} as {name} on {path}")
             components.append(RealComponent(launch, load_class(launch.class_path)))
             classes |= classes_of(launch)
-        rerun = await asyncio.to_thread(run_again, recording, classes, components)
+        rerun = await in_thread_within(partial(run_again, recording, classes, components), None)
         sources = {launch.address for launch, _kind in components}
         recorded = (with_names(classes, one) for one in recording.messages() if one.source in sources)
         result = print_comparison(compared(recorded, rerun.said, tolerances), as_json=as_json)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,16 @@ from backbone.launcher.endings import ExitCode
 from backbone.recording import reader
 
 MESSAGES, READ = 100, 10
+HANGS = """
+import os, signal, sys, threading
+from pathlib import Path
+from backbone.command_line import event_loop, replaying
+def hang(*_given):
+    os.kill(os.getpid(), signal.SIGINT)
+    threading.Event().wait()
+replaying.run_again = hang
+event_loop.exit_code_of(lambda: replaying.run_without(Path(sys.argv[1]), [], "", {}, {}, as_json=True))
+"""
 ALL = replaying.Playing(None, 90.0, 1.0, False, ())
 
 Command = Callable[[Path, Path], Awaitable[int]]
@@ -76,6 +88,13 @@ def test_it_ends_at_once_and_leaves_nothing(
     assert not (tmp_path / "new.mcap").exists()
     assert not list(short_path.rglob("replay-*"))
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.processes
+@pytest.mark.timeout(60)
+def test_a_component_that_hangs_in_a_rerun_holds_up_no_ctrl_c(night: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", HANGS, str(night)], timeout=30, check=False, capture_output=True)
+    assert done.returncode == -signal.SIGINT, done.stderr
 
 
 def test_where_a_shell_ignores_ctrl_c_it_stays_ignored() -> None:
