@@ -1,7 +1,8 @@
 """The recorder of a mission, or of one of its hosts, that was started with ``--record``: a process of its own.
 
 It begins before the first component and ends after the last. If it ends early, the recording continues in a further
-file. If its file cannot grow, it is absent with the reason. If it hangs, it is absent until it responds again.
+file. If its file cannot grow, it is absent with the reason, on a full disc until there is room. If it cannot begin, it
+is tried again. If it hangs, it is absent until it responds again.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import itertools
 import json
 import logging
 import os
+import shutil
 import signal
 import sys
 from asyncio.subprocess import PIPE, Process
@@ -29,6 +31,9 @@ from backbone.ranges import LONGEST_LINE
 BEGUN_WITHIN_S = 20.0  # chosen: as long as a component has to become ready
 ENDED_WITHIN_S = 10.0  # chosen: writing the index of an hour takes less than a second
 AGAIN_AFTER_S = 1.0  # chosen: the cause of its end may be over by then; seconds of the machine
+AGAIN_AT_LEAST_EACH_S = 60.0  # chosen: a process that begins for nothing each minute takes no time from others
+ROOM_EACH_S = 5.0  # chosen: a person who frees disc space waits no longer
+ROOM_BYTES = 200 * 1000 * 1000  # chosen: twice ``recorder.LEAST_FREE_BYTES``, else it would soon end again
 NAME = "recorder"
 BEGUN = "records to"
 """What a recorder prints when it listens."""
@@ -132,18 +137,36 @@ class MissionRecorder:
         """Start the recorder again whenever it has ended, until cancelled."""
         while self._process is not None:
             process, last = self._process, await self._ended()
-            if process.returncode == ExitCode.REFUSED:
-                self._lost(last, "", "Free disc space, or bring the mission up with another file.")
+            if process.returncode != ExitCode.REFUSED:
+                self._lost(last, "the recording goes on in a further file")
+            elif not self._has_room():
+                self._lost(last, "the recording goes on in a further file when there is room", "Free disc space.")
+                while not self._has_room():
+                    await self._clock.sleep_s(ROOM_EACH_S * self._clock.rate)
+            else:
+                self._lost(last, "", "Bring the mission up with another file.")
                 return
-            self._lost(last, "the recording goes on in a further file")
-            await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+            await self._begin_again()
+
+    async def _begin_again(self) -> None:
+        rest_s = AGAIN_AFTER_S
+        while True:
+            await self._clock.sleep_s(rest_s * self._clock.rate)
             try:
                 await self.begin()
             except RecorderFailed as error:
-                self._lost(error.detail, "", error.remedy)
+                rest_s = min(2.0 * rest_s, AGAIN_AT_LEAST_EACH_S)
+                self._lost(error.detail, f"it is tried again in {rest_s:g} s", error.remedy)
+            else:
+                self._absence = None
+                self.on_changed("the recording goes on")
                 return
-            self._absence = None
-            self.on_changed("the recording goes on")
+
+    def _has_room(self) -> bool:
+        try:
+            return shutil.disk_usage(self._path.parent).free >= ROOM_BYTES
+        except OSError:  # the folder is gone, maybe with a disc that comes back
+            return False
 
     async def end(self) -> None:
         """End the recorder after its file is complete. Idempotent."""
@@ -212,8 +235,10 @@ class MissionRecorder:
             self.on_changed("its recorder responds again")
 
     def _lost(self, cause: str, doing: str, remedy: str = "") -> None:
+        is_known = self._absence is not None and self._absence.cause == cause
         self._absence = Absence(NAME, self._clock.now_s(), cause, doing, remedy)
-        self.on_changed(f"lost its recorder: {cause}{f'; {doing}' if doing else ''}")
+        if not is_known:
+            self.on_changed(f"lost its recorder: {cause}{f'; {doing}' if doing else ''}")
 
 
 class _PrintedLines:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shutil
 import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import psutil
 import pytest
@@ -15,6 +18,7 @@ import pytest
 from backbone.bus.clock import MissionClock
 from backbone.launcher import mission_recorder
 from backbone.launcher.mission_recorder import MissionRecorder, RecorderFailed
+from backbone.recording.recorder import LEAST_FREE_BYTES
 from backbone.waiting import end_tasks
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(60)]
@@ -44,11 +48,15 @@ def played(folder: Path, words: str, monkeypatch: pytest.MonkeyPatch) -> Mission
     return MissionRecorder("night", folder / "night.mcap", MissionClock.started_now(), [])
 
 
-async def until_it_hangs(folder: Path) -> None:
+async def until(holds: Callable[[], bool]) -> None:
     until_s = time.monotonic() + WITHIN_S
-    while not (folder / "hangs").exists():
+    while not holds():
         assert time.monotonic() < until_s
         await asyncio.sleep(0.05)
+
+
+async def until_it_hangs(folder: Path) -> None:
+    await until((folder / "hangs").exists)
 
 
 def left(folder: Path) -> list[int]:
@@ -106,13 +114,64 @@ async def test_of_one_that_cannot_begin_the_last_line_is_the_reason(
 
 
 @pytest.mark.parametrize("words", [f"{COUNTS}; exit 1", "rm recorder; exit 1"], ids=["long last words", "no program"])
-async def test_one_that_falls_and_cannot_begin_again_is_absent(
+async def test_one_that_falls_and_cannot_begin_again_is_absent_until_it_can(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(mission_recorder, "AGAIN_AFTER_S", 0.05)
     recorder = played(tmp_path, f"{FALLS_FOR_GOOD}; {words}", monkeypatch)
+    changes: list[str] = []
+    recorder.on_changed = changes.append
+    await recorder.begin()
+    keeping = asyncio.create_task(recorder.keep())
+    try:
+        await until(lambda: (absence := recorder.absence()) is not None and "did not begin" in absence.cause)
+        played(tmp_path, "echo records to night-2.mcap >&2", monkeypatch)
+        await until(lambda: recorder.absence() is None)
+        assert changes[-1] == "the recording goes on"
+        assert len(changes) == 3, "each cause is told once"
+    finally:
+        await end_tasks(keeping)
+        await recorder.end()
+    assert left(tmp_path) == []
+
+
+FULL = "test -e full || { touch full; echo records to night.mcap >&2; echo the disc is full >&2; exit 5; }"
+
+
+class Disc(NamedTuple):
+    free: int
+
+
+async def test_one_whose_disc_is_full_goes_on_when_there_is_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert mission_recorder.ROOM_BYTES > LEAST_FREE_BYTES
+    free = [mission_recorder.ROOM_BYTES - 1]
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: Disc(free[0]))
+    monkeypatch.setattr(mission_recorder, "ROOM_EACH_S", 0.05)
+    recorder = played(tmp_path, f"{FULL}; echo records to night-2.mcap >&2", monkeypatch)
+    await recorder.begin()
+    keeping = asyncio.create_task(recorder.keep())
+    try:
+        await until(lambda: recorder.absence() is not None)
+        absence = recorder.absence()
+        assert absence is not None
+        assert (absence.cause, absence.remedy) == ("the disc is full", "Free disc space.")
+        free[0] += 1
+        await until(lambda: recorder.absence() is None)
+    finally:
+        await end_tasks(keeping)
+        await recorder.end()
+    assert left(tmp_path) == []
+
+
+async def test_one_whose_file_cannot_grow_though_there_is_room_is_absent_for_good(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: Disc(mission_recorder.ROOM_BYTES))
+    recorder = played(tmp_path, FULL, monkeypatch)
     await recorder.begin()
     await asyncio.wait_for(recorder.keep(), WITHIN_S)
     absence = recorder.absence()
     assert absence is not None
-    assert "did not begin" in absence.cause
-    assert left(tmp_path) == []
+    assert "another file" in absence.remedy
