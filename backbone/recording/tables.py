@@ -89,9 +89,12 @@ class Commanders:
 
     def of(self, message: Recorded) -> str:
         """Return the commander of the robot of this message; empty: none, or the message is of no ARC."""
-        body = message.body if isinstance(message.body, dict) else {}
-        arc = body.get("arc") or self._arcs.get((body.get("rc", ""), body.get("epoch", 0)), "")
-        return self.owner_of(arc)
+        match message.body:  # in a module's own message these words may mean anything
+            case {"arc": str(arc)} if arc:
+                return self.owner_of(arc)
+            case {"rc": str(rc), "epoch": int(epoch)}:
+                return self.owner_of(self._arcs.get((rc, epoch), ""))
+        return ""
 
     def owner_of(self, arc: str) -> str:
         """Return the owner of an ARC, by the name of the person or behavior; empty: not known."""

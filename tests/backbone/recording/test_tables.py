@@ -65,3 +65,8 @@ def test_a_message_without_an_arc_is_of_the_arc_of_its_epoch():
     commanders.take(said("Connect/1", {"arc": "watch-capture", "epoch": 7}, asked))
     applied = [said("Applied/1", {"rc": rc, "epoch": epoch}, motions) for rc, epoch in (("scout1", 7), ("scout1", 6))]
     assert [commanders.of(one) for one in applied] == ["watch", ""]
+
+
+@given(body=st.dictionaries(st.sampled_from(["arc", "rc", "epoch"]), leaves | st.lists(leaves) | st.just({"x": 1})))
+def test_in_a_modules_own_message_these_words_may_mean_anything(body: dict[str, Any]):
+    assert Commanders().of(said("Path/1", body)) == ""
