@@ -33,7 +33,7 @@ def write_videos(recording: Recording, folder: Path, keys: tuple[str, ...]) -> l
     """Write an MP4 file for each key with pictures; return them.
 
     Raises:
-        NoVideo: A file could not be opened.
+        NoVideo: A file could not be opened, or is not complete.
     """
     commanders = Commanders()
     videos: dict[str, _Video] = {}
@@ -50,6 +50,8 @@ def write_videos(recording: Recording, folder: Path, keys: tuple[str, ...]) -> l
     finally:
         for video in videos.values():
             video.close()
+    for video in videos.values():
+        video.check()
     return [video.path for video in videos.values()]
 
 
@@ -59,6 +61,7 @@ class _Video:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._writer: Any = None
+        self._added = 0
         self._size = (0, 0)
 
     def add(self, picture: NDArray[np.uint8], line: str) -> None:
@@ -77,11 +80,24 @@ class _Video:
             below, line, (4, LINE_PX - 8), cv2.FONT_HERSHEY_SIMPLEX, TEXT_SCALE, (255, 255, 255), 1, cv2.LINE_AA
         )
         self._writer.write(np.vstack([scaled, below]))
+        self._added += 1
 
     def close(self) -> None:
         """Complete the file."""
         if self._writer is not None:
             self._writer.release()
+
+    def check(self) -> None:
+        """Return if the completed file has all pictures; OpenCV does not say that the disc was full.
+
+        Raises:
+            NoVideo: Pictures are missing.
+        """
+        written = cv2.VideoCapture(str(self.path))
+        count = int(written.get(cv2.CAP_PROP_FRAME_COUNT))
+        written.release()
+        if count < self._added:
+            raise NoVideo(f"{self.path} lacks pictures", remedy="Free disc space, and export again.")
 
 
 def _picture(message: Recorded) -> NDArray[np.uint8]:
