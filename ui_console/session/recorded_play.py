@@ -7,7 +7,6 @@ player and console are created again at the new time; the screen stays. Commands
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import IO, Generic, Protocol, TypeVar
@@ -24,6 +23,7 @@ from backbone.recording.markers import markers_in
 from backbone.recording.playback import Playback
 from backbone.recording.player import Player
 from backbone.recording.reader import Recording, open_file
+from backbone.recording.writer import NS
 from backbone.waiting import end_tasks, first_to_end
 
 NEAR_S = 2.0  # chosen: a shorter step ahead is played, so that no message is left out; mission seconds
@@ -152,7 +152,7 @@ class RecordedPlay(Generic[Console]):
 
     def step(self) -> None:
         """Go to the next picture, decision or event, and pause there."""
-        since_s = math.nextafter(self.playback.now_s(), math.inf)
+        since_s = (round(self.playback.now_s() * NS) + 1) / NS  # a recording counts whole nanoseconds
         following = next(self._recording.messages(STEPS_TO, since_s), None)
         self.playback.pause()
         self.go_to(self.playback.end_s if following is None else following.at_s)
