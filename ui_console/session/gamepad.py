@@ -26,7 +26,8 @@ except ImportError:  # an extra; few machines have it
 
 log = logging.getLogger(__name__)
 
-EV_KEY, EV_ABS = 1, 3  # Linux, input-event-codes.h
+EV_SYN, EV_KEY, EV_ABS = 0, 1, 3  # Linux, input-event-codes.h
+SYN_DROPPED = 3
 ABS_X, ABS_Y, ABS_HAT0X, ABS_HAT0Y = 0, 1, 16, 17
 BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_TL, BTN_TR, BTN_SELECT, BTN_START = 304, 305, 307, 310, 311, 314, 315
 DEAD_MAN = frozenset({BTN_TL, BTN_TR})
@@ -87,7 +88,8 @@ class Gamepad(Protocol):
 class Stick:
     """Turns events of the device into positions of the stick.
 
-    Law: without the dead-man button the robot does not drive, in any position of the stick.
+    Law: without the dead-man button the robot does not drive, in any position of the stick. If the kernel lost events,
+    because this process did not read for a while, the button's release may be among them: it must be pressed again.
 
     Args:
         ranges: Axis → least and largest value.
@@ -106,6 +108,8 @@ class Stick:
             least, most = self._ranges[event.code]
             share = 2 * (event.value - least) / max(1, most - least) - 1
             self._at[event.code] = 0.0 if abs(share) < STILL_ZONE else min(max(share, -1.0), 1.0)
+        elif event.type == EV_SYN and event.code == SYN_DROPPED:
+            self._held.clear()
         elif event.type == EV_KEY and event.code in DEAD_MAN:
             if event.value:
                 self._held.add(event.code)

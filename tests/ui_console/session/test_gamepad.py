@@ -28,6 +28,8 @@ from ui_console.session.gamepad import (
     CROSS,
     EV_ABS,
     EV_KEY,
+    EV_SYN,
+    SYN_DROPPED,
     NoGamepad,
     PadWish,
     Stick,
@@ -101,6 +103,18 @@ def test_up_is_forward_and_right_turns_right() -> None:
     assert stick.wanted() == (1.0, 0.0)
     stick.feel(Said(EV_ABS, ABS_X, 32767))
     assert stick.wanted() == (1.0, 1.0)
+
+
+def test_after_lost_events_the_dead_man_button_must_be_pressed_again() -> None:
+    """The kernel drops events that a paused process does not read, and the button's release with them."""
+    stick = Stick(RANGES)
+    for event in (Said(EV_KEY, BTN_TL, 1), Said(EV_ABS, ABS_Y, -32768), Said(EV_SYN, SYN_DROPPED, 0)):
+        stick.feel(event)
+    assert stick.wanted() is None
+    stick.feel(Said(EV_ABS, ABS_Y, 0))
+    assert stick.wanted() is None
+    stick.feel(Said(EV_KEY, BTN_TL, 1))
+    assert stick.wanted() == (0.0, 0.0)
 
 
 class PlayedGamepad:
