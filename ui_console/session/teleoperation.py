@@ -91,7 +91,7 @@ class Teleoperation(OrderVerbs):
         self._hand_over = HandOver(self, self.give_back)
         self._waiting = Waiting(self, self._hand_over, self._waits_for)
         self._presence = OperatorPresence(self)
-        self._next = ("", "")
+        self._next: tuple[str, str] | None = None
         self._switching = asyncio.Lock()
 
     # ------------------------------------------------------------------ verbs
@@ -130,7 +130,7 @@ class Teleoperation(OrderVerbs):
 
         Orders of both robots continue; if the other robot has an order, the stick only turns to it. The present robot
         stays with the stick until the behavior of its order can take it. After several calls in a row the console
-        claims the last robot.
+        claims the last robot; after a later release, none.
 
         Args:
             robot: Its name.
@@ -146,6 +146,8 @@ class Teleoperation(OrderVerbs):
             if robot != now.robot or kind not in ("", now.kind):
                 self.parameters = msgspec.structs.replace(now, robot=robot, kind=kind or self._kind)
                 await self._claim.give_back(f"{self.user} takes {robot}", for_good=True)
+            if wished != self._next:
+                return
             if self._orders.goes_on(robot):
                 self.show(events.TurnedTo(self.clock.now_s(), robot))
             else:
@@ -214,6 +216,7 @@ class Teleoperation(OrderVerbs):
             for_good: End the ARC even if the console usually keeps it.
             wanted: False if the operator did not request the release.
         """
+        self._next = None
         robot, had_stick = self._robot, self._claim.is_asking
         had_order = await self._orders.give_back(robot, reason)
         await self._claim.give_back(reason, for_good=for_good, wanted=wanted)

@@ -34,6 +34,35 @@ def test_of_releases_and_claims_in_a_row_the_last_one_counts(
     placer_world(scene)
 
 
+@pytest.mark.parametrize(
+    ("pressed", "wish"), [("sr", None), ("ssr", None), ("srt", "scout2"), ("srs", "scout4"), ("rs", "scout3")]
+)
+def test_of_switches_and_releases_in_a_row_the_last_one_counts(
+    placer_world: Any, beside: Any, pressed: str, wish: str | None
+) -> None:
+    """All are pressed while the first release waits for the placer; each switch goes to a robot of its own."""
+
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, lambda event: None)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            placer.stop_takes_s = dict.fromkeys(placer.arcs, 0.5)
+            for number, key in enumerate(pressed, 2):
+                match key:
+                    case "t":
+                        driven.take()
+                    case "r":
+                        driven.begin_release()
+                    case _:
+                        driven.start_task(driven.switch(f"scout{number}"), "switch")
+                await placer.clock.sleep_s(0.05)
+            await placer.clock.sleep_s(3.0)
+            assert driven.is_held == (wish is not None)
+            assert [arc.parameters["wish"]["robot"] for arc in placer.arcs.values()] == ([wish] if wish else [])
+
+    placer_world(scene)
+
+
 def test_a_console_outlives_a_placer_that_does_not_confirm_the_end_of_an_arc_that_rested(
     placer_world: Any, beside: Any
 ) -> None:
