@@ -92,6 +92,8 @@ class Teleoperation(OrderVerbs):
         self._waiting = Waiting(self, self._hand_over, self._waits_for)
         self._presence = OperatorPresence(self)
         self._next: tuple[str, str] | None = None
+        self.has_begun = asyncio.Event()
+        """Set once the first claim or order is given, so that verbs are later than it."""
         self._switching = asyncio.Lock()
 
     # ------------------------------------------------------------------ verbs
@@ -267,6 +269,7 @@ class Teleoperation(OrderVerbs):
         if self._first_orders:
             self.show(events.TurnedTo(self.clock.now_s(), self.parameters.robot))
             self.order_group(self._first_orders)
+        self.has_begun.set()
         self.start_task(self._controls.run(), "keys")
         if self.parameters.away_after_s > 0:
             self.start_task(self._presence.run(self.parameters.away_after_s, self._go_away), "presence")

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 
 from backbone.errors import LinkError, Refusal
+from backbone.waiting import first_of
 from ui_console.model.driving import HaltWish
 from ui_console.model.orders import Order
 from ui_console.session.teleoperation import Teleoperation
@@ -48,7 +49,7 @@ class OwnConsole:
                 await console.switch(robot, kind)
 
     async def order(self, ordered: Callable[[], Sequence[Order]]) -> bool:
-        """Give orders; return False if the console is not ready for them.
+        """Give orders; return False if the console is ending.
 
         Args:
             ordered: Returns the orders when the console is ready for them.
@@ -95,6 +96,7 @@ class OwnConsole:
         return self._life is not None and not self._life.done()
 
     async def _open(self, robot: str, orders: Sequence[Order] = ()) -> None:
+        """Open a console; return when it is ready for later actions, or over."""
         try:
             self._console = console = await self._opening(robot, orders)
         except LinkError as error:
@@ -102,6 +104,7 @@ class OwnConsole:
             return
         self._life = asyncio.create_task(self._live(console), name=f"life of {console.address}")
         self._life.add_done_callback(self._ended)
+        await first_of(asyncio.shield(self._life), console.has_begun.wait())
 
     async def _live(self, console: Teleoperation) -> None:
         try:
