@@ -106,7 +106,7 @@ class Operator:
         self._found: FoundLog | None = None
         self._ordering = Ordering(services.team)
         self._latency_s: dict[str, float] = {}
-        self._work: dict[bytes, asyncio.Task[None]] = {}
+        self._work: dict[asyncio.Task[None], AtWork] = {}
         self._stops: set[asyncio.Task[None]] = set()
 
     # ------------------------------------------------------------------ messages of the browser
@@ -165,7 +165,7 @@ class Operator:
 
         Emergency stops are carried out to their end, because their operator expects robots to stand.
         """
-        stops, work = list(self._stops), list(self._work.values())
+        stops, work = list(self._stops), list(self._work)
         for task in work:
             task.cancel()
         if work:
@@ -284,15 +284,15 @@ class Operator:
             self._services.attention_changed()
 
     def _begin(self, intent: AtWork) -> None:
-        same = msgspec.json.encode(intent)
-        if same in self._work:
+        """Begin an intent; a repetition of the newest one at work has no effect of its own."""
+        if intent == next(reversed(self._work.values()), None):
             return
         if isinstance(intent, Asked) and len(self._work) >= MOST_ASKED:
             self._answer({"refused": "too much is being asked at once; wait for the answers"})
             return
         task = asyncio.create_task(self._do(intent), name=f"{self.welcome.user}:{type(intent).__name__}")
-        self._work[same] = task
-        task.add_done_callback(lambda done: self._done(done, same))
+        self._work[task] = intent
+        task.add_done_callback(self._done)
 
     def _begin_stop(self, intent: Stop) -> None:
         """Begin an emergency stop; every press counts, because an earlier stop at work may be lifted already."""
@@ -377,8 +377,8 @@ class Operator:
     def _show_failed(self, error: Refusal | LinkError) -> None:
         self.show(failed(self._services.clock.now_s(), error))
 
-    def _done(self, task: asyncio.Task[None], same: bytes = b"") -> None:
-        self._work.pop(same, None)
+    def _done(self, task: asyncio.Task[None]) -> None:
+        self._work.pop(task, None)
         self._stops.discard(task)
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._services.observer.fail(bug)
