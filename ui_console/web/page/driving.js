@@ -54,6 +54,10 @@ export class Driving {
     addEventListener("pointerup", () => {
       this.hint.hidden = true;
     });
+    addEventListener("keydown", (event) => {
+      if (event.key === "Meta") this.loseKeys();
+    });
+    for (const taker of ["contextmenu", "dragstart"]) addEventListener(taker, () => this.loseKeys(), true);
     addEventListener("blur", () => this.letGo());
     addEventListener("pagehide", () => this.letGo());
     document.addEventListener("visibilitychange", () => {
@@ -141,6 +145,11 @@ export class Driving {
     this.stick = [0, 0];
     if (wasHeld) this.update();
     else if (always) this.say({ do: "stop" });
+  }
+
+  /** Let go of held keys: browsers report no release during a menu or a drag, nor, on a Mac, while Command is held. */
+  loseKeys() {
+    if (this.keys.size > 0) this.letGo();
   }
 
   followGamepad() {
