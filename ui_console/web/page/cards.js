@@ -85,10 +85,15 @@ export class Cards {
       (one === name ? this.stage : this.thumbs).append(root);
     }
     if (focus instanceof HTMLElement && focus.closest(".robot")) focus.focus({ preventScroll: true });
+    if (this.cards.size > MOST_WATCHED) this.watch();
   }
 
+  /** Ask for as many pictures as the server sends, first for the large one. */
   watch() {
-    this.say({ do: "watch", robots: [...this.cards.keys()].slice(0, MOST_WATCHED) });
+    const names = [...this.cards.keys()].sort(
+      (one, other) => Number(other === this.large) - Number(one === this.large),
+    );
+    this.say({ do: "watch", robots: names.slice(0, MOST_WATCHED) });
   }
 
   /** @param {Picture} picture */
