@@ -27,6 +27,7 @@ FAULTS_FORGIVEN = 5  # chosen: an old page in a browser's cache must reload, and
 TOKEN_BYTES = 24  # chosen: 192 bits cannot be guessed
 
 MAX_USER = 63  # as long as a component's name
+SHOWN_OF_PAGE = 4  # chosen: hexadecimal digits that tell a team's nameless pages apart
 ShortText = Annotated[str, msgspec.Meta(max_length=MAX_USER)]
 IntentT = TypeVar("IntentT")
 """The intents of one kind of page."""
@@ -37,7 +38,8 @@ class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
     Attributes:
         token: Token that the server printed at its start.
-        user: Name of the person, for the record; the name of an operator's own token takes precedence.
+        user: Name of the person, for the record; the name of an operator's own token takes precedence. Each page
+            without a name is a person of its own.
         priority: Requested priority; the token's priority is the maximum.
         page: Identifies a page that reconnects; an earlier connection of the same page is closed.
     """
@@ -231,7 +233,7 @@ class ClientSession(Generic[IntentT]):
         granted = self._authenticator.rights_of(hello.token)
         if granted is None:
             return self._out(ViolationKind.TOKEN, "showed a wrong token", "Open the address that serve printed.")
-        user = granted.user or " ".join(hello.user.split()) or "unnamed"
+        user = granted.user or _one_line(hello.user) or _one_line(f"unnamed {hello.page[:SHOWN_OF_PAGE]}")
         wished = granted.priority if hello.priority is None else hello.priority
         self.welcome = Welcome(user, min(max(wished, 0), granted.priority), hello.page)
         return self.welcome
@@ -256,3 +258,7 @@ class ClientSession(Generic[IntentT]):
     def _out(self, kind: ViolationKind, line: str, remedy: str) -> ProtocolViolation:
         self.is_out = True
         return ProtocolViolation(kind, line, remedy)
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -119,7 +119,11 @@ def test_a_token_made_for_somebody_has_that_name() -> None:
     assert session(TokenRights("anna", 5)).heard(hello(user="eve"), 0.0) == Welcome("anna", 5)
     assert session().heard(hello(user="  a\n b "), 0.0) == Welcome("a b", 100)
     assert session().heard(hello(), 0.0) == Welcome("unnamed", 100)
-    assert session().heard(hello(page="7f-01"), 0.0) == Welcome("unnamed", 100, "7f-01")
+
+
+def test_people_at_two_pages_without_a_name_are_two_people() -> None:
+    for page, user in (("7f01a-2", "unnamed 7f01"), ("8e-3", "unnamed 8e-3"), (" \n", "unnamed")):
+        assert session().heard(hello(page=page), 0.0) == Welcome(user, 100, page)
 
 
 def test_who_shows_no_token_in_time_is_late() -> None:
