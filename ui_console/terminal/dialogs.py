@@ -29,7 +29,8 @@ from ui_console.terminal.lines import Row, lift_lines
 T = TypeVar("T")
 CSS = """
 Dialog { align: center middle; }
-Dialog > Vertical { width: 90%; max-width: 100; height: auto; max-height: 90%; padding: 0 1; }
+/* min-width: Textual cannot lay out a list without a column */
+Dialog > Vertical { width: 90%; min-width: 20; max-width: 100; height: auto; max-height: 90%; padding: 0 1; }
 Dialog > Vertical { border: thick $primary; background: $surface; }
 Dialog OptionList { height: auto; max-height: 20; }
 Dialog VerticalScroll { height: auto; max-height: 100%; }
