@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Coroutine
 from typing import ClassVar, Generic, TypeVar
 
@@ -11,6 +12,7 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.mission_time import was_started_again
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.printable import printable_all
@@ -24,6 +26,8 @@ from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.feed import ConsoleFeed, FeedEvent
 from ui_console.session.lift_talk import LiftTalk
 from ui_console.session.map_feed import MapFeed
+
+log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
@@ -80,6 +84,7 @@ class Observer(Component[P_co], Generic[P_co]):
         self.answers = answers or ConsentAnswers(self.user, clock, self.show, self.acted)
         """The questions to its operator."""
         self._stops: set[asyncio.Task[object]] = set()
+        self._was_cut = False
         self._answers_of = answers_of or (lambda user: self.answers if user in (self.user, self.address) else None)
 
     # ------------------------------------------------------------------ the operator's actions
@@ -155,6 +160,7 @@ class Observer(Component[P_co], Generic[P_co]):
 
     async def connect(self) -> None:
         """Subscribe to the mission's messages."""
+        self.bus.watch_link(self._heard_link)
         if self._watches:
             self.feed.listen()
         if self.map is not None:
@@ -217,6 +223,17 @@ class Observer(Component[P_co], Generic[P_co]):
         self._stops.add(task)
         task.add_done_callback(self._stops.discard)
         return await asyncio.shield(task)
+
+    def _heard_link(self, is_up: bool) -> None:
+        if is_up and self._was_cut:
+            self.start_task(self._end_with_mission(), "the mission's time")
+        self._was_cut = not is_up
+
+    async def _end_with_mission(self) -> None:
+        """End if the link leads to a later mission of the same name, because no time on the screens would be true."""
+        if await was_started_again(self.bus, self.clock):
+            log.warning("%s ends: its mission was started again", self.name)
+            self.end("its mission was started again")
 
     def _heard(self, event: FeedEvent) -> None:
         self.show(event)
