@@ -149,7 +149,7 @@ class ArcClaim:
     def _kind_found(self, wished: TeleoperationParameters, kind: str) -> None:
         if self._console.parameters == wished:
             self._console.parameters = msgspec.structs.replace(wished, kind=kind)
-            self.take()
+        self.take()  # if the parameters changed meanwhile, the kind is sought for the new ones
 
     def _claim_refused(self, refusal: Refusal) -> None:
         self.refusal, now_s = refusal, self._console.clock.now_s()

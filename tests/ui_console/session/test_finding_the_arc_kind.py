@@ -90,6 +90,24 @@ def test_a_release_while_the_kind_is_sought_claims_nothing(local_mission: Any, b
     run_virtual(scene())
 
 
+def test_a_claim_whose_parameters_change_while_the_kind_is_sought_is_made_with_the_new_ones(
+    local_mission: Any, beside: Any
+) -> None:
+    async def scene() -> None:
+        async with local_mission("local") as network:
+            mission = Mission(network, "rover1", answers=False)
+            async with beside(mission.console):
+                await mission.placer.clock.sleep_s(1.0)
+                mission.console.change_parameters({"priority": 7})
+                mission.serve(COMPONENT_DATABASE, ListTypes, Types([arc_kind("wheels", "rover")]))
+                mission.serve(DEPENDENCY_DATABASE, AskResources, Resources(HARDWARE))
+                await mission.placer.wait(lambda: mission.placer.arcs)
+                assert mission.placer.arcs["console-7-wheels"].parameters["path"] == [["console-7", 7]]
+            await mission.placer.close()
+
+    run_virtual(scene())
+
+
 def test_without_an_answer_the_claim_is_refused_with_a_remedy_and_can_be_repeated(
     local_mission: Any, beside: Any
 ) -> None:
