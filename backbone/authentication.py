@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import re
 from pathlib import Path
 
 from backbone.errors import Refusal
@@ -69,6 +70,23 @@ def is_loopback(address: str) -> bool:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:
         return address == "localhost"
+
+
+def is_address(text: str) -> bool:
+    """Return whether this is an IP address, or a host name that the system would look up.
+
+    Example:
+        >>> is_address("192.0.2.7"), is_address("field.local"), is_address("192.0.2.300"), is_address("field..local")
+        (True, True, False, False)
+    """
+    try:
+        if ":" in text or re.fullmatch(r"[0-9.]+", text):
+            ipaddress.ip_address(text)
+        else:
+            text.encode("idna")
+    except ValueError:
+        return False
+    return True
 
 
 def new_secret() -> str:

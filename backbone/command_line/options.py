@@ -21,6 +21,7 @@ from typer.main import get_command_name
 from typer.models import CommandInfo, TyperInfo
 
 from backbone import __version__
+from backbone.authentication import is_address
 from backbone.command_line.standard_streams import standard_streams
 from backbone.command_line.where import Where
 from backbone.errors import BackboneError
@@ -136,13 +137,18 @@ def print_version(is_asked: bool) -> None:
         raise typer.Exit
 
 
-ENDPOINT = re.compile(r"((tcp|tls|quic|udp|ws)/[^\s/?#]+:[0-9]{1,5}|unixsock-stream/[^\s?#]+)(\?[^\s?#]+)?(#[^\s?]+)?")
+ENDPOINT = re.compile(
+    r"((tcp|tls|quic|udp|ws)/(?P<host>[^\s/?#]+):[0-9]{1,5}|unixsock-stream/[^\s?#]+)(\?[^\s?#]+)?(#[^\s?]+)?"
+)
 """The form that Zenoh reads, with metadata and configuration at its end."""
 
 
 def hub_endpoint(value: str | None) -> str | None:
     """Refuse a text that is not a hub endpoint; for options that take an endpoint."""
-    if value is not None and ENDPOINT.fullmatch(value) is None:
+    if value is None:
+        return None
+    found = ENDPOINT.fullmatch(value)
+    if found is None or not is_address((found["host"] or "").strip("[]")):
         raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
     return value
 

@@ -6,11 +6,9 @@ once. World and behaviors have files of their own.
 
 from __future__ import annotations
 
-import ipaddress
-import re
 from collections.abc import Iterator, Mapping, Sequence
 
-from backbone.authentication import is_loopback
+from backbone.authentication import is_address, is_loopback
 from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name, offer_name
@@ -77,8 +75,12 @@ def _check_hosts(tables: Tables, report: Report) -> None:
     check_unique(hosts, "name", "host", report)
     for host in hosts:
         address = host.text("address")
-        if (re.fullmatch(r"[0-9.]+", address) or ":" in address) and not _is_ip(address):
-            report.fault(host.place_of("address"), f"{quoted(address)} is no IP address", "Write it like 192.0.2.7")
+        if not is_address(address):
+            report.fault(
+                host.place_of("address"),
+                f"{quoted(address)} is no IP address and no host name",
+                "Write it like 192.0.2.7 or field.local",
+            )
         name = creator_name(host.text("name"))
         if is_legal(host.text("name")) and not is_legal(name):
             report.fault(
@@ -103,14 +105,6 @@ def _check_hub_endpoint(hosts: list[Element], report: Report) -> None:
             f"no other machine reaches {quoted(hosts[0].text('address'))}, and {listed(others)} must",
             f"Write the address at which they reach {hosts[0].text('name')}",
         )
-
-
-def _is_ip(address: str) -> bool:
-    try:
-        ipaddress.ip_address(address)
-    except ValueError:
-        return False
-    return True
 
 
 def _check_core(tables: Tables, report: Report) -> None:

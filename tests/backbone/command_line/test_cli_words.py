@@ -47,6 +47,7 @@ def test_help_tells_every_command_whole(command_line: Any) -> None:
     [
         *("garbage", "tcp/", "tcp/host", "tcp/host:port", "192.0.2.7:7447", "ftp/host:1", ""),
         *("tcp/host:1?", "tcp/host:1#", "tcp/host:1#a=b?c=d", "tcp/#:1", "unixsock-stream//run/m#a?b"),
+        *("tcp/192.0.2..7:7447", "tcp/lab..local:7447", "tcp/192.0.2.300:7447", "tcp/[::g]:7447"),
     ],
 )
 def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(command_line: Any, wrong: str) -> None:
@@ -58,7 +59,11 @@ def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(comma
 
 
 @pytest.mark.parametrize(
-    "right", ["tcp/192.0.2.7:7447", "tcp/[::1]:7447", "tls/lab:1?prio=1-3#a=/b;c=d", "unixsock-stream//run/m/hub"]
+    "right",
+    [
+        *("tcp/192.0.2.7:7447", "tcp/[::1]:7447", "tcp/[fe80::1%eth0]:7447", "tcp/lab.local:1"),
+        *("tls/lab:1?prio=1-3#a=/b;c=d", "unixsock-stream//run/m/hub"),
+    ],
 )
 def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
     assert hub_endpoint(right) == right
