@@ -17,7 +17,7 @@ _LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
 
 
 def last_lines(run_directory: str, name: str) -> list[str]:
-    """Return the end of a component's log, at most ``LAST_LINES`` lines; empty if there is none."""
+    """Return the end of a component's log, at most ``LAST_LINES`` lines; empty if it cannot be read."""
     return _end_of_log(run_directory, name)[-LAST_LINES:]
 
 
@@ -33,7 +33,7 @@ def _end_of_log(run_directory: str, name: str) -> list[str]:
         with log_path(run_directory, name).open("rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _LAST_BYTES))
             return file.read().decode(errors="replace").splitlines()
-    except FileNotFoundError:
+    except OSError:  # it was removed, or no descriptor is left: the component is restarted all the same
         return []
 
 

@@ -345,3 +345,16 @@ def test_who_falls_says_the_bug_that_its_log_ends_with(on_bench: Callable, tmp_p
         assert fell.how == state.last_end
 
     on_bench(body)
+
+
+def test_who_falls_is_restarted_though_its_log_cannot_be_read(on_bench: Callable, tmp_path: Path) -> None:
+    async def body(bench: Bench) -> None:
+        started = msgspec.structs.replace(launch("Failing", "failing"), run_directory=str(tmp_path))
+        log_path(str(tmp_path), "failing").mkdir(parents=True)
+        await bench.keeper.start(started, POLICY, 5.0)
+        bench.bus.publish("resource_pool/failing", Conversation.COMMAND, Stop("now"))
+        await VirtualClock().sleep_s(1.0)
+        [state] = bench.keeper.processes()
+        assert (state.pid, state.restarts, state.last_end) == (FIRST_PID + 1, 1, "exit code 1")
+
+    on_bench(body)
