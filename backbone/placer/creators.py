@@ -123,6 +123,24 @@ class Creators:
                 f"{name}: {error}; whether it still runs on {host} is unknown", name=name, outcome="unknown"
             ) from error
 
+    async def end_everywhere(self, host: str, name: str, reason: str) -> EndedBy:
+        """End the component on its host, and on a silent host that may still run it; return when neither can run it.
+
+        Args:
+            host: Its host in the book; empty: none.
+
+        Raises:
+            CreatorSilent: The creator lives but does not answer; the outcome is unknown.
+        """
+        by = await self.end(host, name, reason) if host else EndedBy.ITSELF
+        silent = ""
+        while (until_s := self._book.fenced_until_s(name, self._clock.now_s())) is not None:
+            silent = self._book.silent_host(name)
+            await self._news.or_at(until_s)
+        if self._book.is_alive(silent):  # it was only cut off
+            by = await self.end(silent, name, reason)
+        return by
+
     async def fate_of_spawn(self, record: PlacementRecord) -> tuple[Fate, int]:
         """Ask the creator for the outcome of an unanswered order, and for the pid if the component is ready.
 

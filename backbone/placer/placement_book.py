@@ -117,6 +117,10 @@ class PlacementBook:
         self._fences.pop(name, None)
         return None
 
+    def silent_host(self, name: str) -> str:
+        """Return the host on which this component is fenced; empty: none."""
+        return self._fences.get(name, ("", 0.0))[0]
+
     def stopped(self) -> dict[str, str]:
         """Return the names that were ordered to stop and were not started since, with the reason."""
         return dict(self._stopped)

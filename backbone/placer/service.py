@@ -25,7 +25,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Absence
 from backbone.component_database.messages import Admit, Admitted, ComponentType, Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.creator.messages import EndedBy, RestartPolicy, Spawn
+from backbone.creator.messages import RestartPolicy, Spawn
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
@@ -220,9 +220,8 @@ class Placer(Component[PlacerParameters]):
         record.unwanted = True
         self.story.note(name, f"is to be stopped: {reason}")
         self._happened.tell()
-        host = record.host
         try:
-            by = await self._creators.end(host, name, reason) if host else EndedBy.ITSELF
+            by = await self._creators.end_everywhere(record.host, name, reason)
         except CreatorSilent:
             record.unwanted = False
             raise

@@ -69,6 +69,33 @@ async def test_what_a_silent_host_may_still_run_is_started_elsewhere_only_when_i
 
 
 @on("a", "b")
+async def test_a_stop_is_confirmed_only_when_a_silent_host_cannot_run_it_any_more(one: Mission) -> None:
+    await one.start("watcher", "w", host="b")
+    one.cut_off("b")
+    stopping = asyncio.create_task(one.stop("w"))
+    await one.clock.sleep_s(CUT_OFF_ENDS_WITHIN_S - 1.0)
+    assert not stopping.done()
+    await one.creators["b"].kill_child("w")
+    assert (await stopping).by is EndedBy.ITSELF
+    assert await one.placements() == {}
+
+
+@on("a", "b")
+async def test_what_is_stopped_while_its_host_is_cut_off_is_ended_there_before_the_stop_is_confirmed(
+    one: Mission,
+) -> None:
+    await one.start("watcher", "w", host="b")
+    one.cut_off("b")
+    stopping = asyncio.create_task(one.stop("w"))
+    await one.clock.sleep_s(3.0)
+    assert not stopping.done()
+    one.reconnect("b")
+    await stopping
+    assert one.creators["b"].lives == {}
+    assert await one.placements() == {}
+
+
+@on("a", "b")
 async def test_a_start_on_a_host_that_fell_silent_is_repeated_elsewhere_only_when_it_cannot_run(one: Mission) -> None:
     await one.start("watcher", "w0", host="a")
     one.creators["b"].spawn_s = 2.0
