@@ -370,7 +370,8 @@ class PlacementBook:
             return [Note(spawn.name, f"was found on {host}")]
         if record.host == host:
             return []
-        if record.lost and not record.unwanted:
+        is_meant = record.lost or (not record.host and record.pin in ("", host) and _are_alike(record.spawn, spawn))
+        if is_meant and not record.unwanted:
             _adopt(record, host, process, asked_s)
             return [Note(spawn.name, f"came back with {host}")]
         return [EndOrphan(host, spawn.name), Note(spawn.name, f"came back with {host}, but is wanted elsewhere")]
@@ -380,6 +381,16 @@ class PlacementBook:
         type_name, _, number = spawn.name.rpartition("-")
         if type_name == spawn.type and number.isdecimal():
             self._numbers[type_name] = max(self._numbers.get(type_name, 0), int(number))
+
+
+def _are_alike(one: Spawn, other: Spawn) -> bool:
+    """Return whether the same owner wants the same of both orders."""
+    return (one.requester, one.type, one.class_path, one.parameters) == (
+        other.requester,
+        other.type,
+        other.class_path,
+        other.parameters,
+    )
 
 
 def _adopt(record: PlacementRecord, host: str, process: ProcessState, asked_s: float) -> None:

@@ -15,6 +15,7 @@ from backbone.creator.messages import (
 )
 from backbone.errors import ReplyTimeout
 from backbone.nameserver.service import Nameserver
+from backbone.placer.creators import ANSWER_WITHIN_S
 from backbone.placer.messages import (
     AskPlacement,
     CreatorSilent,
@@ -231,6 +232,26 @@ async def test_a_restarted_placer_knows_what_runs_and_for_whom(one: Mission) -> 
     await one.clock.sleep_s(10.0)
     assert (await one.placements())["scout1"] == ""
     assert await one.stop("watcher-1") == Ended("watcher-1", EndedBy.ASKING)
+
+
+@on("a", "b")
+async def test_what_runs_on_a_host_that_a_restarted_placer_meets_late_runs_on(one: Mission) -> None:
+    """Its owner misses it, and has asked for it again, before the creator has listed it."""
+    await one.start("scout", "scout1", host="b")
+    creator = one.creators["b"]
+    alive = creator.lives["scout1"]
+    creator.answers_list = False
+    await one.kill("placer")
+    await one.begin(Placer, "placer")
+    await one.clock.sleep_s(ANSWER_WITHIN_S + 1.5)
+    starting = asyncio.create_task(one.start("scout", "scout1", host="b"))
+    await one.clock.sleep_s(0.5)
+    assert not starting.done()
+    creator.answers_list = True
+    assert (await starting).host == "b"
+    await one.clock.sleep_s(3.0)
+    assert creator.lives == {"scout1": alive}
+    assert creator.spawns == ["scout1"]
 
 
 @on("a", "b")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from backbone.component.messages import NameTaken
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
@@ -225,6 +226,17 @@ def test_a_component_that_was_stopped_while_its_host_was_cut_off_is_ended_when_i
     book.forget("w1")
     assert EndOrphan("a", "w1") in book.creator_up("a", [], 1, [process(spawn("w1"))], 3.0)
     assert book.find("w1") is None
+
+
+@pytest.mark.parametrize(
+    ("wanted", "pin"),
+    [(spawn("w1", kind="other"), ""), (replace(spawn("w1"), parameters={"n": 2}), ""), (spawn("w1", pinned=True), "b")],
+    ids=["another type", "other parameters", "another host"],
+)
+def test_what_is_found_but_wanted_otherwise_is_ended(wanted: Spawn, pin: str) -> None:
+    book = book_with("b")
+    book.reserve(wanted, pin, 1.0)
+    assert EndOrphan("a", "w1") in book.creator_up("a", [], 1, [process(spawn("w1"))], 2.0)
 
 
 def test_a_component_its_creator_no_longer_lists_ended_by_itself() -> None:
