@@ -17,6 +17,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import ClassVar
 
+from backbone.addresses import NAMESERVER
 from backbone.authentication import read_secret_file
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
@@ -32,8 +33,9 @@ from backbone.creator.messages import (
 )
 from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.launcher.kept_creator import KeptCreator, Offered, recorder_of_host
-from backbone.launcher.mission_connection import clock_elsewhere, mission_clock
+from backbone.launcher.mission_connection import REPLY_TIME_S, clock_elsewhere, mission_clock
 from backbone.launcher.mission_recorder import MissionRecorder
+from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.naming import Subsystem, legal
 from backbone.operating_system.ending_signals import orders_to_end
 from backbone.waiting import set_within
@@ -52,6 +54,7 @@ class Ending(StrEnum):
 
     ORDERED = "ordered to end"
     CUT_OFF = "the link to the mission was lost"
+    REPLACED = "the mission has another machine of this name"
     OTHER_TIME = "the mission's time is no longer the one known here, as after a sleep of this machine"
 
 
@@ -117,7 +120,7 @@ class MachineOffer(Component[NoParameters]):
         self.changed()
 
     async def _watch_link(self) -> None:
-        """End this offer if the link stays down, or if the mission's time has changed when the link is back."""
+        """End this offer if the link stays down, or if time or machine of the mission are others when it is back."""
         self.bus.watch_link(self._link_changed)
         while True:
             await self._link_fell.wait()
@@ -127,6 +130,9 @@ class MachineOffer(Component[NoParameters]):
                 return
             if await self._is_other_time():
                 self._end_as(Ending.OTHER_TIME)
+                return
+            if await self._is_replaced():
+                self._end_as(Ending.REPLACED)
                 return
 
     def _link_changed(self, is_up: bool) -> None:
@@ -146,6 +152,14 @@ class MachineOffer(Component[NoParameters]):
             else:
                 return abs(again.now_s() - self.clock.now_s()) > SAME_TIME_S * self.clock.rate
         return False
+
+    async def _is_replaced(self) -> bool:
+        """Return whether another machine got this one's name while the link was down."""
+        try:
+            holder = (await self.bus.ask(NAMESERVER, Resolve(self.name), Resolved, within_s=REPLY_TIME_S)).component
+        except (UnknownName, LinkError):
+            return False
+        return holder.pid != self.pid
 
     def _end_as(self, ending: Ending) -> None:
         self.ending = ending

@@ -142,6 +142,8 @@ class Registry:
         entry = self._entries.get(component_of(state.address))
         if entry is None or state.address not in entry.tokens:
             return []
+        if _is_held_by_another(entry, state):  # this one was cut off when its name was given away
+            return []
         entry.state = state
         if entry.announced:
             return []
@@ -244,6 +246,16 @@ def _holder(entry: _Entry) -> ComponentState | None:
     if entry.tokens:
         return ComponentState(min(entry.tokens), "", "", 0, LifeState.READY, 0.0)
     return None
+
+
+def _is_held_by_another(entry: _Entry, state: ComponentState) -> bool:
+    """Return whether the claim of another process than this one holds the name."""
+    holder = entry.state
+    return (
+        holder is not None
+        and not _same_process(holder, state)
+        and _Claim(holder.address, holder.host, holder.pid) in entry.claims
+    )
 
 
 def _same_process(one: ComponentState, other: ComponentState) -> bool:

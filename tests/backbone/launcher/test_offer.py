@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from backbone.bus.clock import MissionClock
@@ -16,6 +17,7 @@ from backbone.bus.interface import Bus, Clock, LinkListener, Subscription
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, AskState, ComponentState, Stop, Stopping
+from backbone.component.name_claim import claim_name
 from backbone.creator.messages import (
     ListProcesses,
     Processes,
@@ -88,6 +90,7 @@ class Scene:
     creator: FakeCreator
     bus: BusOnACable
     tester: Bus
+    tester_clock: Clock
     life: asyncio.Task[None]
 
     async def ends(self) -> Ending:
@@ -114,7 +117,7 @@ def on_a_cable(local_mission: Callable[..., Any], monkeypatch: pytest.MonkeyPatc
             life = asyncio.create_task(it.run())
             if not kept.never_ready:
                 await asyncio.wait_for(ready.wait(), WITHIN_S)
-            yield Scene(it, kept, bus, tester, life)
+            yield Scene(it, kept, bus, tester, clock, life)
             it.end("the test is over")
             await life
             await tester.close()
@@ -150,6 +153,21 @@ async def test_a_link_that_is_back_after_a_sleep_of_the_machine_ends_what_runs_h
             await asyncio.sleep(pause_s)
         scene.bus.link_changed(True)
         assert await scene.ends() is Ending.OTHER_TIME
+        assert not scene.creator.runs
+
+
+async def test_a_machine_whose_name_was_given_away_while_it_was_cut_off_ends_what_runs_here(
+    on_a_cable: Callable[..., Any],
+) -> None:
+    async with on_a_cable() as scene:
+        for tokens in list(scene.bus.network.tokens.values()):
+            for token in [token for token in tokens if token.owner is scene.bus]:
+                token.close()
+        other = msgspec.structs.replace(scene.offer.component_state(), pid=scene.offer.pid + 1)
+        await claim_name(scene.tester, scene.tester_clock, other)
+        scene.bus.link_changed(False)
+        scene.bus.link_changed(True)
+        assert await scene.ends() is Ending.REPLACED
         assert not scene.creator.runs
 
 

@@ -150,6 +150,19 @@ def test_a_process_that_dies_before_its_claim_was_seen_keeps_its_name_for_a_mome
     assert registry.resolve("scout1", 6.0).pid == 2
 
 
+def test_who_comes_back_to_a_name_that_was_given_away_does_not_get_it() -> None:
+    registry = Registry(0.0, 0.0)
+    for pid in (1, 2):
+        begun(registry, state(pid=pid))
+        registry.token_changed("resource_pool/scout1", stands=True, now_s=1.0)
+        if pid == 1:  # its link is cut
+            gone(registry, state(pid=1))
+    registry.claim_changed("resource_pool/scout1", "a", 1, stands=True)
+    registry.token_changed("resource_pool/scout1", stands=True, now_s=2.0)
+    assert registry.introduced(state(pid=1)) == []
+    assert registry.resolve("scout1", 2.0).pid == 2
+
+
 def test_ready_is_announced_at_once_and_the_truth_asked_for() -> None:
     registry = Registry(0.0, 0.0)
     begun(registry, state())
