@@ -14,7 +14,8 @@ Rules:
 * Each ordered start gets exactly one ``ReportReady`` or ``ReportStartFailed``; each ordered end gets exactly one
   ``ReportEnded``, after the whole process tree has ended.
 * A first start that fails by itself (an exit code above 0, silence) is not repeated, because its owner decides. A
-  first start that ends from outside (a signal, a stop) is repeated under any policy, because its owner still waits.
+  first start that ends from outside (a signal, a stop) is repeated under any policy, because its owner still waits. If
+  it ended so ``FIRST_STARTS`` times, the component itself is the reason (a crash in a C library, a stop of its own).
 * A ready process that is silent for longer than its policy allows hangs. It is killed before it is restarted, so a
   process that was only paused never gets a second copy.
 """
@@ -47,6 +48,7 @@ from backbone.creator.silence import SHOWN_AFTER_S
 
 TERM_S = 0.5  # chosen: like EndProcess.term_s, for ends without an order
 LEAVE_S = 0.15  # chosen: a process ends 10 ms after it has left the bus, on a busy machine after ten times that
+FIRST_STARTS = 5  # chosen: nobody kills a starting component so often by chance; with its pauses under 2 s in all
 NEVER_S = math.inf
 
 
@@ -302,7 +304,7 @@ class Supervision:
         one.pid, one.last_end, one.last_code, one.deadline_s, one.silent_s = 0, how, returncode, NEVER_S, 0.0
         was_answered, is_ordered = one.start_answered, one.end is not None and one.end.ordered
         came_from_outside = returncode <= 0 and one.end is None and not one.is_abandoned
-        if not was_answered and came_from_outside:
+        if not was_answered and came_from_outside and one.restarts + 1 < FIRST_STARTS:
             return [self._fall(one, how, now_s)]
         answers: list[Instruction] = [] if was_answered else [ReportStartFailed(one.name, how)]
         if one.end is not None and is_ordered:

@@ -20,7 +20,7 @@ from backbone.creator.decisions import (
     SupervisionWakesAt,
 )
 from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, RestartPolicy
-from backbone.creator.supervision import LEAVE_S, TERM_S, Supervision, describe
+from backbone.creator.supervision import FIRST_STARTS, LEAVE_S, TERM_S, Supervision, describe
 
 
 def running(policy: RestartPolicy | None = None, *, asked_by_signal: bool = False) -> Supervision:
@@ -244,3 +244,17 @@ def test_a_start_that_is_ended_from_outside_is_begun_again_also_without_restart(
     assert isinstance(fell, ReportFell)
     assert fell.restart_in_s >= 0
     assert ForkComponent("arc") in supervision.woken(1.2 + fell.restart_in_s)
+
+
+@pytest.mark.parametrize("returncode", [0, -signal.SIGSEGV])
+def test_a_first_start_that_crashes_again_and_again_has_failed(returncode: int) -> None:
+    supervision, now_s = Supervision(), 0.0
+    supervision.start_ordered("scout1", RestartPolicy(), 5.0, now_s)
+    for pid in range(1, FIRST_STARTS):
+        supervision.forked("scout1", pid, now_s)
+        assert isinstance(supervision.exited(pid, returncode, now_s)[0], ReportFell)
+        now_s += 10.0
+        assert ForkComponent("scout1") in supervision.woken(now_s)
+    supervision.forked("scout1", FIRST_STARTS, now_s)
+    assert supervision.exited(FIRST_STARTS, returncode, now_s) == [ReportStartFailed("scout1", describe(returncode))]
+    assert supervision.find("scout1") is None
