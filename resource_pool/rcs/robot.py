@@ -143,7 +143,10 @@ class RobotRc(ResourceController[P], Generic[P]):
             case LiftStop(number=number, user=user):
                 if self._latch.lift(number, user or asked.source, self.clock.now_s()):
                     self._keep_stop()
-                    self._tell_stop(self._latch.state, "may move again")
+                    lifted = self._latch.state
+                    await self._end_stop_packet()  # first, because commands follow the news
+                    if self._latch.state == lifted:
+                        self._tell_stop(lifted, "may move again")
                 return self._latch.state
             case _:
                 return await super().answer(asked)
@@ -262,6 +265,16 @@ class RobotRc(ResourceController[P], Generic[P]):
         if is_new:
             self.publish_event(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
         return self._latch.state
+
+    async def _end_stop_packet(self) -> None:
+        """Repeat a halt from now on: repeated stop packets would stop a part that moves beside the wheels again."""
+        holder = self._holder
+        if holder is None:
+            return
+        try:
+            await self._load(holder, self._protocol.halt())
+        except (Refusal, LinkError) as error:  # the next motion of the wheels replaces the stop packet
+            self.story.note(holder.arc, f"the stop packet is still repeated: {error}")
 
     def standing_stop(self) -> StandingStop | None:
         """Return the stop in force, for the published state."""

@@ -14,7 +14,7 @@ from world_joints import joints
 from backbone.bus.clock import run_virtual
 from backbone.component.abilities import ValueKind
 from backbone.dependency_database.messages import Resource
-from resource_pool.arc_client import ArcClient, stop_robot
+from resource_pool.arc_client import ArcClient, lift_stop, stop_robot
 from resource_pool.commands import Drive, Jump, Move, SwitchTransmitter, WrongCommand
 from resource_pool.messages import COMMAND_TIMEOUT_S, NoSuchAction
 from resource_pool.robots.rover.arcs import RoverCaptureArc, RoverDriveArc
@@ -199,6 +199,17 @@ def test_an_emergency_stop_stops_it_and_refuses_wheels_and_gripper(local_mission
         assert await pool.pose("rover1") == pytest.approx(stood_m, abs=1e-3)
         assert await gripper(pool) == pytest.approx(gripped, abs=0.01)
         assert sent(pool)[-1] == HaltPacket()
+
+    play(local_mission, scene)
+
+
+def test_after_a_stop_is_lifted_its_gripper_moves_although_no_wheel_was_commanded(local_mission: Any) -> None:
+    async def scene(pool: Pool, arc: ArcClient) -> None:
+        operator = pool.voice_of(OPERATOR)
+        arc.heard_stop(await lift_stop(operator, await stop_robot(operator, "rover1", "child in the room")))
+        await arc.give("grip", {"closed": 1.0, "lift": 1.0})
+        await pool.clock.sleep_s(6.0)
+        assert min(await gripper(pool)) > 0.95
 
     play(local_mission, scene)
 
