@@ -27,6 +27,8 @@ JUMP_M = 0.5  # chosen: farther than a Scout's jump over 30 cm leads
 JUMP_RAD = math.pi / 2  # chosen: the robot lands on its wheels, but turned
 ROUND_M = 0.01  # chosen: resolution of a count
 ROUND_RAD = 0.02  # chosen: same
+COASTS_M = 0.3  # chosen: most robots coast less after their last command, or are pushed less by hand
+COASTS_RAD = 1.0  # chosen: same
 FASTEST_M_S = 5.0  # chosen: faster than any indoor robot; an odometer with a larger step has been reset
 MOST_RAD_S = 50.0  # chosen: faster than any indoor robot turns
 FARTHEST_M = 1e6  # the limit of ``Meters``
@@ -106,7 +108,7 @@ class DeadReckoning:
         self._until_s = begin.at_s
         self._count: tuple[float, float, float] | None = None  # its own count: way, turn, mission time
         self._counted_from = (begin, self._doubt)
-        self._commanded: tuple[float, float] | None = (0.0, 0.0)  # way and turn until the first count
+        self._commanded: tuple[float, float] | None = (0.0, 0.0)  # way and turn since the last count; None: unknown
         self._sighted_s = -math.inf
         self._past = deque([(begin.at_s, begin.pose)], maxlen=REMEMBERED)
 
@@ -136,7 +138,9 @@ class DeadReckoning:
         """Use the robot's own count of way and turn since power-on instead of the commanded motion.
 
         The first count, the first count after a sighting, and an impossible count begin a new series. But if the first
-        count is not larger than the way commanded since the begin, the robot has counted since the begin.
+        count is not larger than the way commanded since the begin, the robot has counted since the begin. A later count
+        begins a new series, too, if only a count that began at 0 again explains it: the robot, or the RC that counts
+        for it, has restarted.
         """
         if not _are_sane(FARTHEST_M, way_m, turned_rad):
             return
@@ -144,9 +148,12 @@ class DeadReckoning:
         now, before = self._belief, self._count
         if self._commanded is not None:
             way, turn = self._commanded
-            if abs(way_m) <= way + ROUND_M and abs(turned_rad) <= turn + ROUND_RAD:
-                before = (0.0, 0.0, self._counted_from[0].at_s)
-            self._commanded = None
+            may_be_from_0 = abs(way_m) <= way + ROUND_M and abs(turned_rad) <= turn + ROUND_RAD
+            if before is None:
+                before = (0.0, 0.0, self._counted_from[0].at_s) if may_be_from_0 else None
+            elif abs(way_m - before[0]) > way + COASTS_M or abs(turned_rad - before[1]) > turn + COASTS_RAD:
+                before = None if may_be_from_0 else before
+        self._commanded = (0.0, 0.0)
         if before is not None:
             way_m_since, turned_since, passed_s = way_m - before[0], turned_rad - before[1], now.at_s - before[2]
             may_s = passed_s + COMMAND_TIMEOUT_S

@@ -216,6 +216,30 @@ def test_a_count_that_begins_anew_moves_nothing() -> None:
     assert are_near(robot.believe(2.0).pose, HERE.moved(0.1, 0.0))
 
 
+@pytest.mark.parametrize("pause_s", [0.5, 3.0, 60.0])
+def test_a_robot_that_counts_from_0_again_after_a_restart_stays_where_it_is(pause_s: float) -> None:
+    """A walker whose RC, which counts its way, is restarted in the middle of a walk."""
+    robot, way_m = DeadReckoning(BEGIN), 0.0
+    for number in range(1, 11):
+        robot.moves(0.3, 0.0, 0.5 * (number - 1))
+        way_m = 0.15 * number
+        robot.counts(way_m, 0.0, 0.5 * number)
+    again_s = 5.0 + pause_s
+    robot.counts(0.0, 0.0, again_s)
+    assert are_near(robot.believe(again_s).pose, HERE.moved(way_m, 0.0))
+    robot.moves(0.2, 0.0, again_s)
+    robot.counts(0.1, 0.0, again_s + 0.5)
+    assert are_near(robot.believe(again_s + 0.5).pose, HERE.moved(way_m + 0.1, 0.0))
+
+
+def test_a_robot_that_backs_to_where_it_began_to_count_is_there() -> None:
+    robot = DeadReckoning(BEGIN)
+    for at_s, speed_m_s, way_m in ((0.0, 0.8, 0.4), (0.5, 0.8, 0.8), (1.0, -0.8, 0.4), (1.5, -0.8, 0.0)):
+        robot.moves(speed_m_s, 0.0, at_s)
+        robot.counts(way_m, 0.0, at_s + 0.5)
+    assert are_near(robot.believe(2.0).pose, HERE)
+
+
 @given(st.lists(st.tuples(pauses, hostile), max_size=20))
 def test_numbers_that_no_robot_can_have_make_no_pose_that_cannot_be_sent(events: list[tuple[float, Event]]) -> None:
     robot = DeadReckoning(BEGIN)
