@@ -12,7 +12,7 @@ from collections.abc import Coroutine
 from typing import Protocol
 
 from backbone.bus.interface import Clock
-from backbone.errors import LinkError
+from backbone.errors import LinkError, OutcomeUnknown
 from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.child_keeper import AGAIN_AFTER_S, end_task
 from mission_control.gated_bus import GatedBus
@@ -87,7 +87,7 @@ class Acting:
             except (SwappedOut, StaleEpoch) as refusal:  # the grant ended first; ``resumed`` begins the next turn
                 log.info("%s stopped acting: %s", self._actor.name, refusal.detail)
                 return None
-            except LinkError as error:
+            except (LinkError, OutcomeUnknown) as error:  # no answer from the ARC, or none to the ARC
                 log.info("%s acts again: %s", self._actor.name, error)
             except EmergencyStopped as stopped:
                 await self._wait_until_it_may_move(arc, stopped)

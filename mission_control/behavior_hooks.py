@@ -47,8 +47,8 @@ class BehaviorHooks:
 
         When: runs as a task from each ``resumed`` on; it is cancelled before ``suspending`` and ``suspended``.
         What: await ``self.arc`` commands and the clock, keep progress on ``self``. If a command is too late for the
-        grant, the task ends without an error. After a ``LinkError`` it begins again; after an operator's stop it begins
-        again when that stop is lifted.
+        grant, the task ends without an error. After a ``LinkError`` or ``OutcomeUnknown`` it begins again; after an
+        operator's stop it begins again when that stop is lifted.
         Not: catch the cancellation and continue.
         """
 

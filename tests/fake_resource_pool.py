@@ -14,7 +14,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import NameTaken, Stop, Stopping
 from backbone.creator.messages import EndedBy, ProcessFell
-from backbone.errors import Refusal
+from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import (
@@ -62,7 +62,7 @@ class FakeArc:
         self.address = address(Subsystem.RESOURCE_POOL, name)
         self.epoch, self.granted = 0, False
         self.commands: list[tuple[float, int, Message]] = []
-        self.refusal: Refusal | None = None
+        self.refusal: BackboneError | None = None
         self.release_refusal: Refusal | None = None
         self.require: Callable[[Any], None] = lambda command: None  # raises what its robot would
         self.released = ""

@@ -7,6 +7,7 @@ from typing import Any
 from behaviors_of_a_placer import ARC, node, root
 from fake_resource_pool import FakePlacer, Run
 
+from backbone.errors import ReplyTimeout
 from backbone.keys import Conversation
 from resource_pool.arc_client import EmergencyStopped, StaleEpoch, StopState
 from resource_pool.stop_latch import StopLatch
@@ -61,6 +62,23 @@ def test_a_command_that_its_rc_refused_because_the_grant_had_ended_ends_acting_q
         arc.refusal = None
         await arc.grant()
         await placer.wait(lambda: arc.commands and arc.commands[-1][1] == 2)
+
+    placer_world(scene)
+
+
+def test_a_robot_that_does_not_answer_its_arc_costs_time_and_not_the_behavior(placer_world: Run) -> None:
+    """The behavior's process has all of its progress."""
+
+    async def scene(placer: FakePlacer) -> None:
+        driver = await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        arc.refusal = ReplyTimeout("scout1 did not answer within 0.8 s")
+        await arc.grant()
+        await placer.clock.sleep_s(2.0)
+        arc.refusal = None
+        await placer.wait(lambda: arc.commands, within_s=0.5)
+        assert placer.components["driver"] is driver
 
     placer_world(scene)
 
