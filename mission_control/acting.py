@@ -81,8 +81,8 @@ class Acting:
         while True:
             try:
                 if self.resumes_again:
-                    self.resumes_again = False
                     await self._hooks.resumed(arc.granted.rcs if arc.granted is not None else {})
+                    self.resumes_again = False
                 return await self._hooks.act()
             except (SwappedOut, StaleEpoch) as refusal:  # the grant ended first; ``resumed`` begins the next turn
                 log.info("%s stopped acting: %s", self._actor.name, refusal.detail)

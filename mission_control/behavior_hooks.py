@@ -35,7 +35,8 @@ class BehaviorHooks:
     async def resumed(self, rcs: Mapping[str, str]) -> None:
         """Continue with the granted RCs.
 
-        When: at the begin of each grant; commands pass and pictures arrive from now on.
+        When: at the begin of each grant; commands pass and pictures arrive from now on. If a command in it fails, it is
+        called again under the rules of ``act``, which follows.
         What: inform algorithms of the elapsed time. Not: drive in a loop; ``act`` is for that.
 
         Args:

@@ -33,7 +33,6 @@ from resource_pool.arc_client import (
     Resumed,
     Suspended,
     Suspending,
-    SwappedOut,
     Usage,
     arc_name,
     claim_parameters,
@@ -246,12 +245,12 @@ class OwnArc:
         owner.story.note(owner.name, f"resumed with {held}")
         owner.report(f"holds {held}")
         owner.suspension_changed()
+        self.acting.resumes_again = False
         try:
             await self._hooks.resumed(notice.rcs)
-        except SwappedOut:
-            if self._gate.is_open:
-                raise
-            self.acting.resumes_again = True  # when it is in charge
+        except (Refusal, LinkError) as error:  # it is not in charge, or there is an obstacle, which ``acting`` handles
+            log.info("%s is resumed again before it acts: %s", owner.name, error)
+            self.acting.resumes_again = True
         if self.client is not None and self.rcs and not owner.status.is_final and self._gate.is_open:
             await self.acting.stop()
             self.acting.begin(self.client)

@@ -77,6 +77,13 @@ class Driver(Behavior[Any]):
             await self.clock.sleep_s(0.1)
 
 
+class Starter(Driver):
+    """Commands its robot at the begin of each grant already."""
+
+    async def resumed(self, rcs: Mapping[str, str]) -> None:
+        await self.arc.halt()
+
+
 class Spectator(Behavior[Any]):
     """Only looks."""
 
@@ -87,6 +94,7 @@ CLASSES: dict[str, type[Component[Any]]] = {
     "parent": Parent,
     "sequence": Sequence,
     "driver": Driver,
+    "starter": Starter,
 }
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from behaviors_of_a_placer import ARC, node, root
 from fake_resource_pool import FakePlacer, Run
 
-from backbone.errors import ReplyTimeout
+from backbone.errors import BackboneError, ReplyTimeout
 from backbone.keys import Conversation
 from resource_pool.arc_client import EmergencyStopped, StaleEpoch, StopState
+from resource_pool.commands import Drive, Halt
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop
+
+STOPPED = EmergencyStopped("scout1 was stopped by anna", rc="scout1")
 
 
 def test_it_acts_only_while_it_holds_the_robot(placer_world: Run) -> None:
@@ -79,6 +83,28 @@ def test_a_robot_that_does_not_answer_its_arc_costs_time_and_not_the_behavior(pl
         arc.refusal = None
         await placer.wait(lambda: arc.commands, within_s=0.5)
         assert placer.components["driver"] is driver
+
+    placer_world(scene)
+
+
+@pytest.mark.parametrize("obstacle", [ReplyTimeout("scout1 does not answer"), STOPPED], ids=["no answer", "stop"])
+def test_if_its_first_command_of_a_grant_fails_it_acts_when_the_obstacle_is_gone(
+    placer_world: Run, obstacle: BackboneError
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("starter", "starter", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["starter-capture"]
+        arc.refusal = obstacle
+        await arc.grant()
+        await placer.clock.sleep_s(2.0)
+        arc.refusal = None
+        await placer.wait(lambda: len(arc.commands) > 1, within_s=2.0)
+        assert [type(command) for _at_s, _epoch, command in arc.commands[:2]] == [Halt, Drive]
+        await arc.suspend()
+        await arc.grant()
+        await placer.clock.sleep_s(0.5)
+        assert [type(command) for _at_s, epoch, command in arc.commands if epoch == 2].count(Halt) == 1
 
     placer_world(scene)
 
