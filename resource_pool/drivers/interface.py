@@ -131,7 +131,7 @@ class Picture:
     """One picture of a grabber.
 
     Attributes:
-        captured_s: Mission time.
+        captured_s: Mission time; the RC drops pictures that are older than the tuning or the last picture.
         pixels: Grey levels 0 to 255 as bytes, row by row from the top, contiguous; others end the RC.
         width_px: Columns.
         height_px: Rows.

@@ -2,7 +2,8 @@
 
 Pictures are published under the ARC's address with the connection's epoch; subscribers drop pictures of other epochs.
 Pictures of a further camera of the ARC have a subaddress, so that each camera's newest picture is delivered. If the
-hardware identifies transmitting robots, a picture is delivered only if exactly the expected robot transmits.
+hardware identifies transmitting robots, a picture is delivered only if exactly the expected robot transmits. A picture
+from before the tuning or before an earlier one, or from the future, is not delivered.
 
 Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
 """
@@ -20,6 +21,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -32,6 +34,7 @@ from resource_pool.resource_controller import RcParameters, ResourceController
 log = logging.getLogger(__name__)
 
 SILENT_S = 0.5  # chosen: a packet gets its turn on the radio within 0.3 s, and its robot appears two pictures later
+WRONG_S = 1.0  # chosen: more than clocks of hosts differ, and than a driver delivers late; mission time
 ARC_REPLY_S = 1.0  # chosen: the ARC asks a robot before it answers; machine seconds
 
 
@@ -73,6 +76,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._delivered = self._garbled = self._silent = self._foreign = 0
         self._kinds: Counter[str] = Counter()
         self._silent_since_s = math.inf
+        self._newest_s, self._mistimed, self._has_told = -math.inf, 0, False
 
     async def connect(self) -> None:
         """Open the device now, so that the first grant is as fast as later ones."""
@@ -109,6 +113,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             self._deliver(hold, order, picture, numbers)
 
         self._silent_since_s = math.inf
+        self._newest_s, self._has_told = self.clock.now_s(), False
         self._tuned = order.frequency, deliver
         self._driver.tune(order.frequency, deliver)
         return {}
@@ -128,8 +133,9 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     def statistics(self) -> dict[str, float]:
         """Count delivered pictures, and pictures dropped because no robot, several robots or another robot transmitted.
 
-        Also return the requested rate, and the rate that the driver allows now; the driver lowers it on a busy host. If
-        the hardware knows the faults of its pictures, count the pictures of each kind too, delivered or dropped.
+        Also count dropped pictures of an impossible time. Also return the requested rate, and the rate that the driver
+        allows now; the driver lowers it on a busy host. If the hardware knows the faults of its pictures, count the
+        pictures of each kind too, delivered or dropped.
         """
         driver, asked_hz = self._driver, self.parameters.frame_rate_hz
         return {
@@ -140,12 +146,15 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             "frames_garbled": self._garbled,
             "frames_silent": self._silent,
             "frames_foreign": self._foreign,
+            "frames_mistimed": self._mistimed,
             **{f"frames_{kind}": float(count) for kind, count in sorted(self._kinds.items())},
         }
 
     def _deliver(self, hold: Hold, order: Tune, picture: Picture, numbers: Iterator[int]) -> None:
         if not self.holds.has(hold.arc, hold.epoch):
             return  # a driver may deliver one picture after its stop
+        if not self._is_in_time(picture.captured_s):
+            return
         if picture.kind:
             self._kinds[picture.kind] += 1
         if picture.transmitters == 0:
@@ -172,6 +181,19 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._delivered += 1
         at = address(Subsystem.RESOURCE_POOL, hold.arc)
         self.bus.publish(f"{at}/{order.camera}" if order.camera else at, Conversation.FRAMES, frame)
+
+    def _is_in_time(self, captured_s: float) -> bool:
+        """Return whether a picture may have this time: not before the last one, not in the future. Count the others."""
+        now_s, wrong_s = self.clock.now_s(), WRONG_S * max(1.0, self.clock.rate)
+        if self._newest_s <= captured_s <= now_s + wrong_s:
+            self._newest_s = captured_s
+            return True
+        self._mistimed += 1
+        if not self._has_told and not abs(captured_s - now_s) <= wrong_s:
+            self._has_told = True
+            what = f"delivers no picture of {captured_s:.1f} s at {now_s:.1f} s of mission time"
+            self.publish_event(self.name, what, LogLevel.WARNING)
+        return False
 
     def _heard_nothing(self, hold: Hold) -> None:
         """Ask the ARC to switch a silent transmitter on, because the transmitter was reset or missed its packet."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from pool_on_local_network import Pool, a_pool
 from pool_orders import EVERYTHING, at, connect, disconnect
 
 from backbone.bus.clock import run_virtual
+from backbone.component.messages import StoryEvent
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from resource_pool.commands import Tune
@@ -122,6 +125,33 @@ def test_garbled_and_silent_pictures_are_counted_and_not_delivered(local_mission
                 2,
                 2,
             )
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(("off_s", "is_told"), [(-0.5, False), (-60.0, True), (60.0, True), (math.nan, True)])
+def test_a_picture_of_another_time_is_not_delivered_and_hides_no_later_one(
+    local_mission: Any, off_s: float, is_told: bool
+) -> None:
+    """Pictures that wait in a driver when another frequency is tuned, and a driver with a clock of its own."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["grabber"], manager=False) as pool:
+            heard, told = list[Frame](), list[StoryEvent]()
+            pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
+            pool.ear.subscribe(at("grabber"), Conversation.LOG, StoryEvent, lambda e: told.append(e.body))
+            await pool.clock.sleep_s(100.0 - pool.clock.now_s())
+            await connect(pool, "grabber", "one", 1)
+            await pool.voice("one").ask(at("grabber"), Tune("video").under("one", 1), Applied, within_s=1)
+            driver = pool.grabber_driver
+            for _ in range(2):
+                picture = driver.picture()
+                driver.deliver(dataclasses.replace(picture, captured_s=picture.captured_s + off_s))
+                driver.deliver(picture)
+                await pool.clock.sleep_s(0.1)
+            assert [(frame.number, frame.captured_s) for frame in heard] == [(1, 100.0), (2, 100.1)]
+            assert pool.running["grabber"].statistics()["frames_mistimed"] == 2
+            assert sum("of mission time" in event.what for event in told) == is_told
 
     run_virtual(main())
 
