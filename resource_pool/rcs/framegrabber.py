@@ -25,6 +25,7 @@ from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
+from backbone.ranges import MOST_PX
 from resource_pool.commands import Command, Tune
 from resource_pool.drivers.interface import FramegrabberDriver, HardwareFault, Picture, YieldingDriver
 from resource_pool.holds import Hold
@@ -35,6 +36,7 @@ log = logging.getLogger(__name__)
 
 SILENT_S = 0.5  # chosen: a packet gets its turn on the radio within 0.3 s, and its robot appears two pictures later
 WRONG_S = 1.0  # chosen: more than clocks of hosts differ, and than a driver delivers late; mission time
+LEAST_PX = 2  # chosen: vision halves pictures; a smaller one comes of a driver that got none
 ARC_REPLY_S = 1.0  # chosen: the ARC asks a robot before it answers; machine seconds
 
 
@@ -164,6 +166,8 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         if not self.is_wanted(picture, order.robot):
             return
         try:
+            if not all(LEAST_PX <= side_px <= MOST_PX for side_px in (picture.width_px, picture.height_px)):
+                raise ValueError(f"{picture.width_px} x {picture.height_px} pixels, each side {LEAST_PX} to {MOST_PX}")
             frame = Frame(
                 rc=self.name,
                 arc=hold.arc,

@@ -68,16 +68,18 @@ WRONG = {
     "every second row": (np.zeros((8, 6), np.uint8)[::2].data, "not contiguous"),
     "a list": ([0] * 24, "bytes-like object"),
 }
+EMPTY = {"nothing": (0, 0), "a row": (6, 1), "a row too long for any message": (8193, 2)}
 
 
-async def delivered(pool: Pool, pixels: Any) -> list[Frame]:
-    """Return what arrives of one picture of 6 x 4 that a driver delivers from its thread."""
+async def delivered(pool: Pool, pixels: Any, width_px: int = 6, height_px: int = 4) -> list[Frame]:
+    """Return what arrives of one picture of this size that a driver delivers from its thread."""
     heard: list[Frame] = []
     pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
     await connect(pool, "grabber", "one", 1)
     await pool.voice("one").ask(at("grabber"), Tune("video").under("one", 1), Applied, within_s=1)
     deliver = pool.grabber_driver.deliver
-    asyncio.get_running_loop().call_soon_threadsafe(deliver, Picture(pool.clock.now_s(), pixels, 6, 4))
+    picture = Picture(pool.clock.now_s(), pixels, width_px, height_px)
+    asyncio.get_running_loop().call_soon_threadsafe(deliver, picture)
     await pool.clock.sleep_s(0.1)
     return heard
 
@@ -93,6 +95,19 @@ def test_a_driver_that_delivers_other_pixels_than_it_says_ends_the_rc(local_miss
             bug = await pool.outcome("grabber")
             assert isinstance(bug, HardwareFault)
             assert told in str(bug)
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("kind", EMPTY)
+def test_a_driver_that_delivers_a_picture_of_no_size_ends_the_rc_and_no_behavior(local_mission: Any, kind: str) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["grabber"], manager=False) as pool:
+            width_px, height_px = EMPTY[kind]
+            assert await delivered(pool, bytes(width_px * height_px), width_px, height_px) == []
+            bug = await pool.outcome("grabber")
+            assert isinstance(bug, HardwareFault)
+            assert f"{width_px} x {height_px} pixels" in str(bug)
 
     run_virtual(main())
 
