@@ -77,6 +77,8 @@ class RobotRc(ResourceController[P], Generic[P]):
     parameters_type: ClassVar[type[msgspec.Struct]] = RobotParameters
     driver_kind, driver_field = "robot", "protocol"
     is_robot = True
+    moves_on_s: ClassVar[float] = 0.0
+    """Time for which a part of the robot may move on after the end of a hold, mission seconds."""
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
@@ -90,6 +92,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._halt_at_s: float | None = None
         self._driven = asyncio.Event()
         self._holder: Hold | None = None
+        self._at_rest_s = self._born_s + self.moves_on_s
         self._frequency = ""
         self._timeouts = 0
         self._stop_file = Path(launch.run_directory) / "stops" / self.name if launch.run_directory else None
@@ -124,6 +127,7 @@ class RobotRc(ResourceController[P], Generic[P]):
     async def make_safe(self, hold: Hold) -> None:
         """Send no further command; the radio sends the safe packet when the radio is disconnected."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
+        self._at_rest_s = self.clock.now_s() + self.moves_on_s
         self.cease()
         self._tell_halted(hold)
 
@@ -260,7 +264,8 @@ class RobotRc(ResourceController[P], Generic[P]):
                 self._latch.confirm(True)
                 self._tell_halted(holder)
         else:
-            self._latch.confirm(True)  # a former holder's last packet was a safe one, or its radio sends no more
+            # A former holder's last packet was a safe one, or its radio sends no more.
+            self._latch.confirm(self.clock.now_s() >= self._at_rest_s)
         self._publish_stop()
         if is_new:
             self.publish_event(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")

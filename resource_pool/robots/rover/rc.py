@@ -1,7 +1,7 @@
 """RC of a rover: speeds, gripper, video transmitter.
 
-In the safe state wheels and transmitter are off, and the gripper keeps its grip. An operator's stop also stops the
-gripper.
+In the safe state wheels and transmitter are off; the gripper goes on to its last place, and keeps its grip. An
+operator's stop also stops the gripper, if an ARC holds the rover.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from resource_pool.drivers.interface import MalformedReply
 from resource_pool.drivers.simulated import SimulatedRobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.rcs.robot import RobotParameters, RobotRc
-from resource_pool.robots.rover.body import TOP_M_S, TOP_RAD_S, WHEEL_RADIUS_M
+from resource_pool.robots.rover.body import LIFT_M, LIFT_M_S, TOP_M_S, TOP_RAD_S, WHEEL_RADIUS_M
 from resource_pool.robots.rover.link import GripPacket, MovePacket, StopPacket, encode
 from resource_pool.robots.rover.report import RoverReport, report_of
 from scout_model.dimensions import CAMERA_TILT_RAD, HORIZONTAL_VIEW_RAD
@@ -65,11 +65,11 @@ class RoverRc(RobotRc[RobotParameters]):
         forward_m=0.165, height_m=WHEEL_RADIUS_M + 0.1275, tilt_rad=CAMERA_TILT_RAD, across_rad=HORIZONTAL_VIEW_RAD
     )
     body_class = "resource_pool.robots.rover.body:Rover"
+    moves_on_s = LIFT_M / LIFT_M_S  # the lift is slower than the paddles
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {
         "forward_m_s": (-TOP_M_S, TOP_M_S),
         "turn_rad_s": (-TOP_RAD_S, TOP_RAD_S),
-        "closed": (0.0, 1.0),
-        "lift": (0.0, 1.0),
+        **dict.fromkeys(("closed", "lift"), (0.0, 1.0)),
     }
     _protocol: RoverProtocol
 

@@ -214,6 +214,24 @@ def test_after_a_stop_is_lifted_its_gripper_moves_although_no_wheel_was_commande
     play(local_mission, scene)
 
 
+def test_a_stop_without_a_holder_is_not_confirmed_while_the_gripper_may_still_move(local_mission: Any) -> None:
+    async def scene(pool: Pool, arc: ArcClient) -> None:
+        operator = pool.voice_of(OPERATOR)
+        await arc.give("grip", {"closed": 1.0, "lift": 1.0})
+        await arc.idle()
+        await pool.clock.sleep_s(1.0)
+        before = await gripper(pool)
+        assert not (await stop_robot(operator, "rover1", "a hand in the gripper")).is_confirmed
+        await pool.clock.sleep_s(5.0)
+        assert min(await gripper(pool)) > min(before) + 0.1
+        at_rest = await gripper(pool)
+        assert (await stop_robot(operator, "rover1", "a hand in the gripper")).is_confirmed
+        await pool.clock.sleep_s(1.0)
+        assert await gripper(pool) == pytest.approx(at_rest, abs=0.01)
+
+    play(local_mission, scene)
+
+
 # ---------------------------------------------------------------------- beside a Scout
 def test_a_scout_and_a_rover_share_one_radio(local_mission: Any) -> None:
     async def scene(pool: Pool, arc: ArcClient) -> None:
