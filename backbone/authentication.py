@@ -72,6 +72,19 @@ def is_loopback(address: str) -> bool:
         return address == "localhost"
 
 
+def is_reachable(address: str) -> bool:
+    """Return whether other machines can reach a machine by this IP address or name.
+
+    Example:
+        >>> is_reachable("192.0.2.7"), is_reachable("field.local"), is_reachable("0.0.0.0"), is_reachable("localhost")
+        (True, True, False, False)
+    """
+    try:
+        return not is_loopback(address) and not ipaddress.ip_address(address).is_unspecified
+    except ValueError:
+        return True
+
+
 def is_address(text: str) -> bool:
     """Return whether this is an IP address, or a host name that the system would look up.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from backbone.authentication import is_address, is_loopback
+from backbone.authentication import is_address, is_loopback, is_reachable
 from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name, offer_name
@@ -99,7 +99,7 @@ def _check_hub_endpoint(hosts: list[Element], report: Report) -> None:
                 f"Remove it; the hub runs on the first host, {hosts[0].text('name')}",
             )
     others = [host.text("name") for host in hosts[1:] if host.text("address") and not is_loopback(host.text("address"))]
-    if others and is_loopback(hosts[0].text("address")):
+    if others and not is_reachable(hosts[0].text("address")):
         report.fault(
             hosts[0].place_of("address"),
             f"no other machine reaches {quoted(hosts[0].text('address'))}, and {listed(others)} must",
