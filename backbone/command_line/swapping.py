@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.interface import Bus
@@ -35,7 +35,7 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
         OutcomeUnknown: It did not answer.
     """
     async with connected(where) as (bus, clock):
-        at, question = await _question(bus, asked)
+        at, question = await addressed(bus, asked)
         publish_action(bus, clock, OperatorAction.SWAP, asked.module, f"for {asked.class_path}")
         within_s = (asked.ready_within_s + asked.prove_s) / clock.rate + READ_WITHIN_S
         try:
@@ -68,8 +68,13 @@ def _told(asked: SwapModule, swapped: Swapped, counts: str) -> str:
     return f"{asked.module}: returned, the old one goes on ({times}): {swapped.cause}"
 
 
-async def _question(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | SwapClass]:
-    """Return the address to ask for the exchange, and the question."""
+async def addressed(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | SwapClass]:
+    """Return the address to ask for the exchange, and the question.
+
+    Raises:
+        UnknownModule: Nothing of the mission that can be exchanged has this name.
+        Silent: What has this name, or may run it, does not answer or is not up.
+    """
     listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
     units = [one.address for one in listed.components if one.type == EXECUTION_UNIT]
     told = await modules_by_unit(bus, units)
@@ -86,7 +91,8 @@ async def _question(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
             raise Silent(f"{asked.module} does not answer: {error}") from None
         times = asked.prove_s, asked.ready_within_s
         return address, SwapClass(asked.class_path, asked.parameters, *times, asked.user)
-    raise await _unknown(bus, asked.module, {*at, *others}, silent)
+    up = {component_of(one.address) for one in listed.components}
+    raise await _unknown(bus, asked.module, {*at, *others}, silent, up)
 
 
 def _may_be_exchanged(one: ComponentState) -> bool:
@@ -94,16 +100,24 @@ def _may_be_exchanged(one: ComponentState) -> bool:
     return one.address.startswith(pools) and one.type != EXECUTION_UNIT
 
 
-async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str]) -> Refusal:
+async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str], up: Collection[str]) -> Refusal:
     """Return the refusal that explains why no part of this name can be exchanged."""
     if silent:
         units = ", ".join(map(component_of, silent))
         return Silent(f"{name} is not known: {units} does not answer and may run it")
     try:
-        stopped = (await bus.ask(PLACER, ListPlacements(), Placements, within_s=REPLY_TIME_S)).stopped
+        placed = await bus.ask(PLACER, ListPlacements(), Placements, within_s=REPLY_TIME_S)
     except LinkError:
-        stopped = {}
-    if name in stopped:
+        placed = Placements([])
+    if name in placed.stopped:
         remedy = "Start it through its owner or by 'scout-backbone start', then swap again."
-        return Silent(f"{name} is stopped: {stopped[name]}", remedy=remedy)
+        return Silent(f"{name} is stopped: {placed.stopped[name]}", remedy=remedy)
+    absent = {one.name: one.type for one in placed.placements if one.name not in up}
+    if name in absent:
+        return Silent(f"{name} is not up", remedy=_NOT_UP)
+    if units := ", ".join(one for one, kind in absent.items() if kind == EXECUTION_UNIT):
+        return Silent(f"{name} is not known: {units} is not up and may run it", remedy=_NOT_UP)
     return UnknownModule(f"no module, behavior or resource {name!r} runs{did_you_mean(name, known)}")
+
+
+_NOT_UP = "Wait until its creator has started it again ('scout-backbone status'), then swap again."
