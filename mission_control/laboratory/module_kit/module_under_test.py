@@ -151,7 +151,7 @@ def _check_class(what: str, port: Port, kind: object, value: object) -> None:
         try:
             written = write(Envelope(WIRE_VERSION, "kit/kit", 0, 0.0, "", value), most)
             same = write(_reader(type(value)).read(written, most), most) == written
-        except (Refusal, TypeError) as error:  # a field of a class that no message may have is a TypeError
+        except (Refusal, TypeError, BufferError) as error:  # a field of another class; pixels with gaps between them
             cause, remedy = (error.detail, error.remedy) if isinstance(error, Refusal) else (str(error), "")
             raise ModuleRuleBroken(f"{what} cannot cross the bus: {cause}", remedy=remedy) from None
         if not same:

@@ -154,6 +154,16 @@ def test_a_large_output_is_as_long_as_a_host_admits(module_under_test: MakeModul
         module_under_test(Maps(Maps.Parameters(MAX_LARGE_MESSAGE_BYTES))).update()
 
 
+class Mirrors(Inverts):
+    def update(self, inputs: Any) -> Any:
+        return self.Outputs(Picture(inputs.picture.pixels[::-1]))
+
+
+def test_pixels_that_are_not_one_after_the_other_break_a_rule(module_under_test: MakeModule) -> None:
+    with pytest.raises(ModuleRuleBroken, match=r"picture of mirrors cannot cross the bus: .* not C-contiguous"):
+        module_under_test(Mirrors()).update(picture=Picture(memoryview(bytearray(3))))
+
+
 def test_pixels_of_a_message_must_not_be_changed_either(module_under_test: MakeModule) -> None:
     inverts = module_under_test(Inverts())
     assert inverts.update(picture=Picture(memoryview(bytearray(3)))).picture.pixels == b"\xff" * 3
