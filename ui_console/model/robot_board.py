@@ -39,6 +39,7 @@ class RobotBoard:
         self._picture, self._alarms, self._links, self._lift_remedy = picture, alarms, links, lift_remedy
         self._renewed: dict[tuple[str, str, int], float] = {}
         self._stops: dict[str, StopState] = {}
+        self._gone: set[str] = set()
         self._readings: dict[str, Readings] = {}
         self._reports: dict[str, list[FieldForm]] = {}
 
@@ -58,7 +59,8 @@ class RobotBoard:
 
     def take_stop(self, stop: StopState, at_s: float) -> None:
         """Record that a robot was stopped, or may move again; a message older than the last one changes nothing."""
-        former = self._stops.get(stop.rc)
+        former = None if stop.rc in self._gone else self._stops.get(stop.rc)
+        self._gone.discard(stop.rc)
         if former is not None and (former.number, not former.is_stopped) > (stop.number, not stop.is_stopped):
             return
         self._stops[stop.rc] = stop
@@ -68,6 +70,11 @@ class RobotBoard:
             self._alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, self._lift_remedy)
         else:
             self._alarms.retract(AlarmKind.STOPPED, stop.rc)  # the log names who lifted it; nothing is left to do
+
+    def take_gone(self, robot: str) -> None:
+        """Record that a robot's RC is gone: the next one may have lost its stops, and count them from the beginning."""
+        if robot in self._stops:
+            self._gone.add(robot)
 
     def take_readings(self, readings: Readings, at_s: float) -> None:
         """Record a robot's readings; a low battery raises an alarm until it is charged or the robot is silent."""

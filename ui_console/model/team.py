@@ -288,6 +288,7 @@ class TeamModel:
         address, name = gone.address, component_of(gone.address)
         component = self.picture.components.get(address)
         self.picture.take(gone)
+        self.robots.take_gone(name)
         self.alarms.end(AlarmKind.UNSAFE, name, at_s)
         if component is None or component.state in LEAVING:
             self._forget(name)

@@ -82,7 +82,8 @@ class ConsoleFeed:
         self._radios: set[str] = set()
         self._robots: set[str] = set()
         self._scheduled: set[str] | None = None
-        self._listing, self._types_due = asyncio.Event(), asyncio.Event()
+        self._listing = asyncio.Event()
+        self._appeared: asyncio.Queue[str] = asyncio.Queue()
         self.listed = asyncio.Event()
         """Set when every component has answered the first questions or timed out."""
         self._is_up = True
@@ -106,7 +107,7 @@ class ConsoleFeed:
         """Ask for the mission's state, now and whenever the link is back, and measure the link; until cancelled."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self._list_when_due(), name="feed:list")
-            group.create_task(self._ask_types_when_due(), name="feed:types")
+            group.create_task(self._ask_appeared(), name="feed:appeared")
             group.create_task(self._feel_link(), name="feed:link")
             group.create_task(self._feel_pulse(), name="feed:pulse")
 
@@ -254,11 +255,13 @@ class ConsoleFeed:
             self._hear(await self._bus.ask(LAUNCHER, AskPeople(), PeopleKnown, within_s=REPLY_TIME_S))
             self._hear(await self._bus.ask(LAUNCHER, AskLog(most=LOG_KEPT), Log, within_s=REPLY_TIME_S))
 
-    async def _ask_types_when_due(self) -> None:
+    async def _ask_appeared(self) -> None:
         while True:
-            await self._types_due.wait()
-            self._types_due.clear()
-            await self._ask_types()
+            address = await self._appeared.get()
+            if address == COMPONENT_DATABASE:
+                await self._ask_types()
+            else:
+                await self._ask_stop(component_of(address))
 
     async def _ask_types(self) -> None:
         """Show the reports of the kinds of robots, with units and ranges."""
@@ -303,8 +306,8 @@ class ConsoleFeed:
         match envelope.body:
             case Appeared(component=component):
                 self._hear(component)
-                if component.address == COMPONENT_DATABASE:
-                    self._types_due.set()
+                if component.is_robot or component.address == COMPONENT_DATABASE:
+                    self._appeared.put_nowait(component.address)
             case Disappeared() as disappeared:
                 self._hear(disappeared)
 

@@ -285,6 +285,32 @@ def test_a_robot_that_was_removed_is_not_told_to_stop_and_one_that_crashed_is(st
     stage(scene)
 
 
+@pytest.mark.parametrize("stops", [0, 1], ids=["lost", "unreadable"])
+def test_the_stop_of_a_robot_is_that_of_its_present_rc_also_if_earlier_ones_were_lost(
+    stage: Callable[[Scene], None], stops: int
+) -> None:
+    """Another host, for example, has no file of the stops."""
+
+    async def scene(on: Stage) -> None:
+        def number() -> int | None:
+            stop = on.model.team.robots.stop_of("scout1")
+            return None if stop is None else stop.number
+
+        async with on.beside(on.manager()), on.beside(on.observer()) as console:
+            async with on.beside(on.robot("scout1")):
+                await on.until(lambda: "scout1" in console.feed.robots)
+                for user in ("anna", "ben", "eve"):
+                    assert await console.stop_robot("scout1", "", user)
+            await on.until(lambda: on.model.team.component("scout1") is None)
+            again = on.robot("scout1")
+            for _stop in range(stops):
+                again.latch.stop("unknown", "", 0.0)
+            async with on.beside(again):
+                await on.until(lambda: number() == (stops or None))
+
+    stage(scene)
+
+
 def test_each_thing_an_operator_does_is_one_event_with_the_name(stage: Callable[[Scene], None]) -> None:
     async def scene(on: Stage) -> None:
         console, robot = on.observer(), on.robot("scout1")
