@@ -20,18 +20,19 @@ const NO_TEXT = ["range", "checkbox", "radio", "button", "submit", "reset", "col
 /**
  * Returns {act, isTaken}, or null: the key is left to the browser. If `isTaken`, the browser must ignore it.
  *
- * Stops work with any focus, even in dialogs and fields. Drive keys do not work where arrows and letters are input, or
+ * Stops work with any focus, even in dialogs and fields, unless the page is cut off: then the fields of the login take
+ * all letters. Drive keys do not work where arrows and letters are input, or
  * while a dialog is open.
  *
  * @typedef {{ key: string, code: string, isRepeat: boolean, hasModifier: boolean }} Key Of the event.
- * @typedef {{ isText: boolean, isRed: boolean, isDialog: boolean, isHeld: boolean }} Place A text is written there; a
- *   red button has the focus; a dialog is open; a robot is held.
+ * @typedef {{ isText: boolean, isRed: boolean, isDialog: boolean, isHeld: boolean, isCut?: boolean }} Place A text is
+ *   written there; a red button has the focus; a dialog is open; a robot is held; the page is not connected.
  *
  * @param {Key} key
  * @param {Place} at
  */
 export function meaningOf(key, at) {
-  if (key.hasModifier) return null;
+  if (key.hasModifier || (at.isCut && at.isText)) return null;
   const stop = STOPS[key.key];
   if (stop) return { act: key.isRepeat ? "" : stop, isTaken: isStopTaken(key.key, at) };
   if (at.isText || at.isDialog || !at.isHeld) return null;
@@ -62,10 +63,10 @@ export function isText(element) {
   return element.tagName === "INPUT" && !NO_TEXT.includes(/** @type {HTMLInputElement} */ (element).type);
 }
 
-/** Takes every key of the page; `does` is called with an act and the key's code, `isHeld`: a robot is held. */
+/** Takes every key of the page; `does` is called with an act and the key's code, `isHeld`: a robot is held, `isCut`: no server hears. */
 export class Keys {
-  /** @param {{ does: (what: string, code: string) => void, isHeld: () => boolean }} given */
-  constructor({ does, isHeld }) {
+  /** @param {{ does: (what: string, code: string) => void, isHeld: () => boolean, isCut: () => boolean }} given */
+  constructor({ does, isHeld, isCut }) {
     let isSpaceTaken = false;
     addEventListener(
       "keyup",
@@ -90,6 +91,7 @@ export class Keys {
             isRed: Boolean(target.closest?.(".emergency")),
             isDialog: document.querySelector("dialog[open]") !== null,
             isHeld: isHeld(),
+            isCut: isCut(),
           },
         );
         if (event.key === " ") isSpaceTaken = meaning?.isTaken ?? false; // a button is pressed when it comes up again

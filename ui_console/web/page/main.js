@@ -96,6 +96,7 @@ const blindness = new Blindness({
 });
 new Keys({
   isHeld: () => hand.stick !== "",
+  isCut: () => !link.isUp,
   does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")),
 });
 followTheme(find("theme", HTMLSelectElement));

@@ -21,6 +21,18 @@ test("x and X stop in every place, are never written, and act once for each pres
   }
 });
 
+test("the login of a page that is cut off takes all letters, and nothing else there does", () => {
+  for (const at of PLACES) {
+    const isWritten = at.isText;
+    for (const [name, act] of [
+      ["x", "stop_mine"],
+      ["X", "stop_all"],
+    ]) {
+      assert.deepEqual(meaningOf(key(name), { ...at, isCut: true }), isWritten ? null : { act, isTaken: true });
+    }
+  }
+});
+
 test("space and escape halt in every place; escape closes dialogs too, and space is written in a text", () => {
   for (const at of PLACES) {
     assert.deepEqual(meaningOf(key("Escape"), at), { act: "halt", isTaken: false });
