@@ -133,8 +133,11 @@ def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
     if evdev is None:
         raise NoGamepad("evdev is not installed")
     for path in evdev.list_devices():
-        device = evdev.InputDevice(path)
-        can = device.capabilities()
+        try:
+            device = evdev.InputDevice(path)
+            can = device.capabilities()
+        except OSError:  # it was unplugged since it was listed
+            continue
         axes = {code: (info.min, info.max) for code, info in can.get(EV_ABS, [])}
         if {ABS_X, ABS_Y} <= axes.keys() and DEAD_MAN & set(can.get(EV_KEY, [])):
             return device, axes

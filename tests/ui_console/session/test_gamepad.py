@@ -200,6 +200,8 @@ class FoundDevice:
         self.path, self.is_closed = path, False
 
     def capabilities(self) -> dict[int, list[Any]]:
+        if self.path == "unplugged":
+            raise OSError(19, "No such device")
         axis = SimpleNamespace(min=0, max=255)
         if self.path == "mouse":
             return {EV_KEY: [272]}
@@ -210,7 +212,8 @@ class FoundDevice:
 
 
 def test_the_first_device_with_a_stick_and_a_shoulder_button_is_the_gamepad(monkeypatch: pytest.MonkeyPatch) -> None:
-    evdev = SimpleNamespace(list_devices=lambda: ["mouse", "pad", "other pad"], InputDevice=FoundDevice)
+    """A device that was unplugged since it was listed is left out."""
+    evdev = SimpleNamespace(list_devices=lambda: ["mouse", "unplugged", "pad", "other pad"], InputDevice=FoundDevice)
     monkeypatch.setattr("ui_console.session.gamepad.evdev", evdev)
     device, ranges = find_gamepad()
     assert isinstance(device, FoundDevice)
