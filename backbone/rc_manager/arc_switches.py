@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterable
 from typing import Protocol
 
 from backbone.bus.interface import Clock
@@ -77,20 +77,24 @@ class ArcSwitches:
         self._under_way[arc] = self._service.start_task(in_turn(), f"switch {arc}")
 
     async def _connect(self, order: ConnectArc) -> None:
-        failed = await self._context_switch.connect(order)
-        if failed is None:
+        vain = await self._context_switch.connect(order, self._release_s(order.epochs))
+        if vain is None:
             self._rcs.connected(order.epochs)
             self._times.granted(order.epochs, order.arc, order.settle_s, self._service.clock.now_s())
             self._service.happened(Opened(order.arc))
             return
-        if failed:
-            self._rcs.failed(failed)
-        self._service.happened(OpenFailed(order.arc, failed))
-        if failed:
-            self._rcs.meet_in_a_while(failed)
+        if vain.failed:
+            self._rcs.failed(vain.failed)
+        for rc in vain.unconfirmed:
+            self._rcs.does_not_answer(rc)
+        self._service.happened(OpenFailed(order.arc, vain.failed))
+        if vain.failed:
+            self._rcs.meet_in_a_while(vain.failed)
 
     async def _revoke(self, order: RevokeArc) -> None:
-        release_s = max(self._rcs.resources[rc].disconnect_s for rc in order.epochs)
-        for rc in await self._context_switch.revoke(order, self._grace_s + release_s):
+        for rc in await self._context_switch.revoke(order, self._grace_s + self._release_s(order.epochs)):
             self._rcs.does_not_answer(rc)
         self._service.happened(Freed(order.arc))
+
+    def _release_s(self, rcs: Iterable[str]) -> float:
+        return max(self._rcs.resources[rc].disconnect_s for rc in rcs)

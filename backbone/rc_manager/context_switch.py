@@ -19,6 +19,7 @@ import logging
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
@@ -49,6 +50,18 @@ Hold = tuple[str, str, int]
 """RC, ARC and epoch."""
 
 
+class Vain(NamedTuple):
+    """A connection in vain, which is undone.
+
+    Attributes:
+        failed: The RC that failed; empty if it was the ARC.
+        unconfirmed: RCs that did not confirm their disconnection: see ``revoke``.
+    """
+
+    failed: str
+    unconfirmed: list[str]
+
+
 class ContextSwitch:
     """Connects RCs, disconnects them and opens gates for the schedule manager.
 
@@ -66,28 +79,30 @@ class ContextSwitch:
         """Return whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
         return arc in self._given_back
 
-    async def connect(self, order: ConnectArc) -> str | None:
+    async def connect(self, order: ConnectArc, within_s: float) -> Vain | None:
         """Connect all RCs to the ARC and order it to open its gate, or undo all of it.
 
         Args:
             order: Instruction of the schedule manager.
+            within_s: Mission seconds after which undoing skips RCs without another holder.
 
         Returns:
-            None: the gate is open. Else the RC that failed, empty if it was the ARC; the ARC holds nothing.
+            None: the gate is open. Else the ARC holds nothing.
         """
         settled_s = self._clock.now_s() + order.settle_s
         failed = await self._connect_rcs(order)
         if failed is None and await self._open_gate(order, settled_s):
             return None
         close = CloseGate("failed", failed or order.arc, 0.0, -1.0)
+        holds, why = _holds(order.arc, order.epochs), f"failed at {failed or order.arc}"
         self._given_back.add(order.arc)
         try:
             async with asyncio.TaskGroup() as both:
                 both.create_task(self._close_gate(order.arc, close))
-                both.create_task(self.disconnect(_holds(order.arc, order.epochs), f"failed at {failed or order.arc}"))
+                undoing = both.create_task(self._disconnect(holds, why, self._clock.now_s() + within_s))
         finally:
             self._given_back.discard(order.arc)
-        return failed or ""
+        return Vain(failed or "", undoing.result())
 
     async def revoke(self, order: RevokeArc, within_s: float) -> list[str]:
         """Close the ARC's gate and disconnect its RCs; return when all RCs are free, except skipped ones.
