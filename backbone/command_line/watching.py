@@ -15,6 +15,7 @@ from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Overhearing
 from backbone.command_line.connection import connected
 from backbone.command_line.key_facts import TrafficRow, ask_facts, with_facts
+from backbone.command_line.line_printer import LinePrinter
 from backbone.command_line.listening import until_ended
 from backbone.command_line.message_lines import (
     TrafficTable,
@@ -68,23 +69,28 @@ class Watched:
 async def watch(where: Where, wanted: Watched) -> ExitCode:
     """Print messages as they come, until a signal, the time, the number or the end of the mission ends it."""
     enough, shown = asyncio.Event(), 0
+    printer = LinePrinter(enough.set)
 
     def heard(key: str, message: Translated, at_s: float) -> None:
         nonlocal shown
         if enough.is_set():
             return
         for line in _lines(key, message, at_s, wanted):
-            show([line])
+            printer.put(line)
             shown += 1
         if wanted.most is not None and shown >= wanted.most:
             enough.set()
 
     async with (
         connected(where) as (bus, clock),
-        overhearing(bus, clock, wanted.keys, heard),
+        overhearing(bus, clock, wanted.keys, heard) as subscribed,
         until_ended(bus, clock, wanted.for_s) as ended,
     ):
         await first_of(ended.wait(), enough.wait())
+        enough.set()
+    await printer.end()
+    if dropped := printer.dropped + sum(one.dropped for one in subscribed):
+        say(f"incomplete: {counted(dropped, 'message')} came faster than they were read")
     return ExitCode.DONE
 
 
