@@ -63,7 +63,10 @@ export function isText(element) {
   return element.tagName === "INPUT" && !NO_TEXT.includes(/** @type {HTMLInputElement} */ (element).type);
 }
 
-/** Takes every key of the page; `does` is called with an act and the key's code, `isHeld`: a robot is held, `isCut`: no server hears. */
+/**
+ * Takes every key of the page; `does` is called with an act and the key's code, `isHeld`: a robot is held, `isCut`: no
+ * server hears.
+ */
 export class Keys {
   /** @param {{ does: (what: string, code: string) => void, isHeld: () => boolean, isCut: () => boolean }} given */
   constructor({ does, isHeld, isCut }) {
