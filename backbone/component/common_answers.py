@@ -47,8 +47,8 @@ class Answering(Protocol):
     def parameters(self) -> msgspec.Struct:
         """The parameters in force."""
 
-    def component_state(self) -> ComponentState:
-        """Return address, process and state."""
+    def answered_state(self) -> ComponentState:
+        """Return address, process and state, for an answer."""
 
     def statistics(self) -> dict[str, float]:
         """Return the component's own counts."""
@@ -84,7 +84,7 @@ class CommonAnswers:
         component = self._component
         match asked.body:
             case AskState():
-                return component.component_state()
+                return component.answered_state()
             case AskTime():
                 return MissionTime(component.clock.now_s(), component.clock.rate, time.time())
             case AskStatistics():

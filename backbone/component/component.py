@@ -191,8 +191,18 @@ class Component(Generic[P_co]):
         """
         return CALM_S
 
+    def answered_state(self) -> ComponentState:
+        """Return the state for an answer; if it was not published, the next news are published in any case.
+
+        Else the state could be as published again when its news are due, and the asker would keep this one.
+        """
+        state = self.component_state()
+        if state != self._state_published:
+            self._state_published = None
+        return state
+
     def publish_news(self) -> None:
-        """Publish the component's news: its state, if it differs from the last published one.
+        """Publish the component's news: its state, if it differs from what is known of it.
 
         When: ``CALM_S`` after ``report`` or ``changed``, once for all news in between.
         """

@@ -65,6 +65,24 @@ def test_several_reports_within_a_moment_are_published_once_with_the_last() -> N
     live(law())
 
 
+def test_a_state_that_was_only_answered_is_corrected_by_the_next_publication() -> None:
+    """Found by a simulated night: a new nameserver was told of an absence that was over before it was published."""
+
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        published = len(stage.states)
+        stage.walker.report("stumbles")
+        assert (await stage.ask(AskState(), ComponentState)).feedback == "stumbles"
+        stage.walker.report("")
+        await stage.clock.sleep_s(0.1)
+        assert [state.feedback for state in stage.states[published:]] == [""]
+        stage.walker.end("enough")
+        await life
+
+    live(law())
+
+
 def test_statistics_join_the_bus_and_the_component() -> None:
     async def law() -> None:
         stage = Stage()
