@@ -13,6 +13,8 @@ from backbone.keys import Conversation
 from backbone.naming import component_of
 from backbone.rc_manager.messages import BEAT_WITHIN_S, Beat
 from backbone.waiting import set_within
+from backbone.wire import UnknownMessage
+from resource_pool.arc_listener import NotMyArc
 from resource_pool.messages import ArcState, AskBeat, Noted
 
 OWNER_GONE_S = 0.5  # chosen: if a console dies, its robot is free within a second; a new hub is found sooner
@@ -67,9 +69,9 @@ class OwnerWatch:
             self._renewed.clear()
             try:
                 await self._bus.ask(self._owner, AskBeat(self._state()), Noted, within_s=OWNER_BEAT_S)
-            except Refusal as refusal:
+            except (NotMyArc, UnknownMessage) as refusal:
                 self._end(f"its owner does not know it: {refusal.detail}")
-            except LinkError as error:
+            except (LinkError, Refusal) as error:  # also of a hook of the owner, which has learned the ARC's state
                 self._note(self._owner, f"does not answer: {error}")
             else:
                 self._bus.publish(self._bus.source, Conversation.BEAT, Beat(arc))

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections import defaultdict
 from typing import Any
 
+import pytest
 from pool_on_local_network import a_pool
 
 from backbone.addresses import RC_MANAGER
-from backbone.bus.clock import run_virtual
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.local_bus import LocalNetwork
+from backbone.errors import OutcomeUnknown, Refusal
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import BEAT_WITHIN_S, RENEW_EVERY_S, Beat, Leases
-from resource_pool.owner_watch import BEAT_SPREAD_S
+from backbone.wire import Envelope, UnknownMessage
+from resource_pool.arc_listener import NotMyArc
+from resource_pool.messages import AskBeat, Noted
+from resource_pool.owner_watch import BEAT_SPREAD_S, OwnerWatch
 
 ROBOTS = ["scout1", "scout2", "radio"]
 
@@ -50,5 +57,39 @@ def test_an_arc_without_an_rc_manager_beats_all_the_same_for_the_next_one(local_
             pool.ear.subscribe("resource_pool/*", Conversation.BEAT, Beat, lambda e: beats_s.append(e.stamp_s))
             await pool.clock.sleep_s(5.0)
             assert len(beats_s) >= 5.0 / BEAT_WITHIN_S - 2
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(
+    ("refusal", "ends"),
+    [
+        (NotMyArc("drive is not claimed here"), True),
+        (UnknownMessage("AskBeat is not answered here"), True),
+        (OutcomeUnknown("its camera did not answer"), False),
+    ],
+    ids=["another ARC's owner", "no owner", "a hook that failed"],
+)
+def test_only_an_owner_that_does_not_know_its_arc_ends_it(refusal: Refusal, ends: bool) -> None:
+    """The hook of an owner may fail when a heartbeat tells it of a grant whose notice was lost."""
+
+    async def main() -> None:
+        network, clock = LocalNetwork(), VirtualClock()
+        owner, arc = network.join("mission_control/watch", clock), network.join("resource_pool/drive", clock)
+        ear = network.join("ui_console/ear", clock)
+        refusals, ended, beats = [refusal], list[str](), list[Beat]()
+
+        async def answer(_asked: Envelope[AskBeat]) -> Noted:
+            if refusals:
+                raise refusals.pop()
+            return Noted()
+
+        owner.serve(owner.source, AskBeat, answer)
+        ear.subscribe(arc.source, Conversation.BEAT, Beat, lambda heard: beats.append(heard.body))
+        watch = OwnerWatch(arc, clock, owner.source, state=lambda: None, end=ended.append, note=lambda *_: None)
+        beating = asyncio.create_task(watch.beat())
+        await clock.sleep_s(2 * BEAT_WITHIN_S)
+        assert (bool(ended), not refusals, beats != []) == (ends, True, True)
+        beating.cancel()
 
     run_virtual(main())
