@@ -46,8 +46,8 @@ class _Host:
 
     view: CandidateHost
     creator_pid: int
-    reported: tuple[int, int] = (-1, -1)
-    """Counts of components, by its creator and by the book, at the last inspection."""
+    inspected: tuple[int, int] = (-1, -1)
+    """Counts of components, by its creator and by the book, after the last inspection."""
 
 
 class PlacementBook:
@@ -293,7 +293,7 @@ class PlacementBook:
         return instructions
 
     def load_heard(self, load: HostLoad) -> list[Instruction]:
-        """Record a host's load; inspect the creator if its count of components differs from the book's."""
+        """Record a host's load; inspect the creator while its count of components differs from the book's."""
         known = self._hosts.get(load.host)
         if known is None:
             return []
@@ -303,10 +303,8 @@ class PlacementBook:
         here = [record for record in self._records.values() if record.host == load.host]
         if any(record.suspect for record in here):
             return [Inspect(load.host)]
-        counts = (load.components, len(here))
         settled = all(record.phase is not PlacementPhase.STARTING for record in here)
-        if settled and load.components != len(here) and counts != known.reported:
-            known.reported = counts
+        if settled and load.components != len(here) and (load.components, len(here)) != known.inspected:
             return [Inspect(load.host)]
         return []
 
@@ -342,6 +340,8 @@ class PlacementBook:
             else:
                 record.misses(f"its creator on {host} does not have it", asked_s)
                 instructions += [Note(name, f"is missing on {host}"), PlaceAgain(name)]
+        if host in self._hosts:
+            self._hosts[host].inspected = len(listed), sum(record.host == host for record in self.records())
         return instructions
 
     # ------------------------------------------------------------------

@@ -275,12 +275,15 @@ def test_only_so_many_orders_to_stop_are_remembered() -> None:
     assert f"w{STOPPED_KEPT + 9}" in book.stopped()
 
 
-def test_a_difference_in_numbers_is_asked_about_once() -> None:
+def test_a_difference_in_numbers_is_asked_about_until_the_creator_has_answered() -> None:
     book = book_with("a")
     run(book, spawn("w1"))
     load = HostLoad("a", ["gl"], 0.5, 0.2, 4, 3)
     assert book.load_heard(load) == [Inspect("a")]
+    assert book.load_heard(load) == [Inspect("a")], "the first question may get no answer"
+    book.inspected("a", [process(spawn(name)) for name in ("w1", "other1", "other2")], 2.0)
     assert book.load_heard(load) == []
+    assert book.load_heard(replace(load, components=2)) == [Inspect("a")]
     assert (book.hosts()[0].cpu, book.hosts()[0].cores, book.hosts()[0].tags) == (0.5, 4, frozenset({"gl"}))
 
 
