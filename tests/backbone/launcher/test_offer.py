@@ -34,7 +34,7 @@ from backbone.launcher.offer import Ending, MachineOffer, Offering
 from backbone.naming import Subsystem
 from backbone.run_files import RunFolderUnusable
 
-CUT_OFF_S = 0.1
+CUT_OFF_S = 0.5
 WITHIN_S = 5.0
 
 
