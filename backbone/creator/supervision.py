@@ -48,7 +48,7 @@ from backbone.creator.silence import SHOWN_AFTER_S
 
 TERM_S = 0.5  # chosen: like EndProcess.term_s, for ends without an order
 LEAVE_S = 0.15  # chosen: a process ends 10 ms after it has left the bus, on a busy machine after ten times that
-FIRST_STARTS = 5  # chosen: nobody kills a starting component so often by chance; with its pauses under 2 s in all
+FIRST_STARTS = 5  # chosen: more than a person or the system ends by chance; takes under 2 s with its pauses
 NEVER_S = math.inf
 
 

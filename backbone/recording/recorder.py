@@ -235,7 +235,7 @@ class Recorder:
         self._before, self._begun_s = self._before + self._writer.written, self._clock.now_s()
         self._writer = self._new_writer()
         self._needs_snapshot.set()
-        for address in tuple(self._present):  # each file tells by itself who is there, and in which state
+        for address in tuple(self._present):  # each file states the present components and their states
             self._alive_changed(address, alive=True)
 
     def _new_writer(self) -> RecordingWriter:

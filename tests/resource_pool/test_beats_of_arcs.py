@@ -71,7 +71,7 @@ def test_an_arc_without_an_rc_manager_beats_all_the_same_for_the_next_one(local_
     ids=["another ARC's owner", "no owner", "a hook that failed"],
 )
 def test_only_an_owner_that_does_not_know_its_arc_ends_it(refusal: Refusal, ends: bool) -> None:
-    """The hook of an owner may fail when a heartbeat tells it of a grant whose notice was lost."""
+    """A heartbeat has the ARC's state: after a lost notice the owner calls its hook then, and the hook may fail."""
 
     async def main() -> None:
         network, clock = LocalNetwork(), VirtualClock()

@@ -128,7 +128,7 @@ async def test_one_that_falls_and_cannot_begin_again_is_absent_until_it_can(
         played(tmp_path, "echo records to night-2.mcap >&2", monkeypatch)
         await until(lambda: recorder.absence() is None)
         assert changes[-1] == "the recording goes on"
-        assert len(changes) == 3, "each cause is told once"
+        assert len(changes) == 3, "the log has each cause once"
     finally:
         await end_tasks(keeping)
         await recorder.end()
