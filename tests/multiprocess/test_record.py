@@ -46,6 +46,7 @@ KILLS, QUICK_KILLS = 100, 3
 HALT = '{"schema": "Halt", "epoch": 1}'
 UNANSWERED = 4  # an ARC that ends is asked once more by creator, placer and RC manager
 AWAITED = MIXED.read_text().count('process="hardware"')  # each minute a creator asks each member when it will end
+CUT_SHORT = 3  # of a recorder: a console ends after the first of its three questions, and the end cancels one more
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +79,9 @@ def ended(recorder: subprocess.Popen[str], by: signal.Signals = signal.SIGINT) -
 
 
 def unexplained(missing: Mapping[str, int]) -> int:
-    """Return how many numbers are missing, without the questions that a creator has open for its members."""
-    return sum(missing.values()) - min(missing.get("backbone/creator-base", 0), AWAITED)
+    """Return how many numbers are missing, without the open questions of a creator to its members and of a recorder."""
+    recorder = sum(count for source, count in missing.items() if source.startswith("backbone/recorder-"))
+    return sum(missing.values()) - min(missing.get("backbone/creator-base", 0), AWAITED) - min(recorder, CUT_SHORT)
 
 
 def looked_into(mission: RunningMission, *words: str) -> list[dict[str, Any]]:
