@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import msgspec
 
+from backbone.component.messages import StandingStop
 from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
 
 MOST_AUTHORS = 16  # chosen: more people than operate one robot
@@ -44,6 +45,15 @@ class StopLatch:
         also = [*state.also, author] if is_new else state.also
         self.state = msgspec.structs.replace(state, number=state.number + 1, also=also)
         return is_new
+
+    def resume(self, stop: StandingStop) -> bool:
+        """Put a stop of the RC's former process in force; return False if a later order is known here."""
+        if stop.number <= self.state.number:
+            return False
+        self.state = StopState(
+            self.state.rc, True, stop.number, stop.by, stop.reason, stop.since_s, is_confirmed=stop.is_confirmed
+        )
+        return True
 
     def confirm(self, is_confirmed: bool) -> None:
         """If the robot is still stopped, record whether the radio accepted the packet that stops the wheels."""

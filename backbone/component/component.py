@@ -31,10 +31,10 @@ from backbone.component.messages import (
     LifeState,
     LogLevel,
     StandingStop,
-    WrongParameter,
 )
 from backbone.component.name_claim import claim_name
 from backbone.component.own_tasks import OwnTasks
+from backbone.component.parameter_values import parameters_of
 from backbone.component.story import StoryBook, feedback_of
 from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
@@ -117,7 +117,7 @@ class Component(Generic[P_co]):
         """``<subsystem>/<name>``."""
         self.pid = os.getpid()
         """Pid of its process. A simulation, where many components share one process, sets other numbers."""
-        self.parameters: P_co = cast(P_co, _convert(launch.parameters, self.parameters_type))
+        self.parameters: P_co = cast(P_co, parameters_of(launch.parameters, self.parameters_type))
         self.story = StoryBook(self.address, clock)
         self.feedback = ""
         self._state, self._since_s = LifeState.CONNECTING, clock.now_s()
@@ -180,6 +180,12 @@ class Component(Generic[P_co]):
         """Return the emergency stop in force on this component; call ``changed`` when the result changes."""
         return None
 
+    def resume_stop(self, stop: StandingStop) -> None:
+        """Take over the emergency stop of the former component of this name, perhaps on another host.
+
+        When: before ``connect``, if that component ended while the stop was in force.
+        """
+
     def person(self) -> str:
         """Return the name of the person at this component; empty: no person."""
         return ""
@@ -222,7 +228,7 @@ class Component(Generic[P_co]):
 
     def with_parameters(self, changed: Mapping[str, object]) -> P_co:
         """Return the parameters with these values replaced, or raise ``WrongParameter``."""
-        return cast(P_co, _convert({**msgspec.to_builtins(self.parameters), **changed}, self.parameters_type))
+        return cast(P_co, parameters_of({**msgspec.to_builtins(self.parameters), **changed}, self.parameters_type))
 
     def change_parameters(self, changed: Mapping[str, object]) -> None:
         """Replace these parameters, unless the values do not fit or ``parameters_changed`` refuses them."""
@@ -316,8 +322,8 @@ class Component(Generic[P_co]):
             raise self._bug
 
     async def _claim_name(self) -> None:
-        if self.registers:
-            await claim_name(self.bus, self.clock, self.component_state())
+        if self.registers and (stop := await claim_name(self.bus, self.clock, self.component_state())) is not None:
+            self.resume_stop(stop)
 
     async def _live_and_report_end(self) -> None:
         try:
@@ -389,10 +395,3 @@ class Component(Generic[P_co]):
 
 AnyComponent = Component[msgspec.Struct]
 """A component with parameters of any kind."""
-
-
-def _convert(values: dict[str, object], kind: type[msgspec.Struct]) -> msgspec.Struct:
-    try:
-        return msgspec.convert(values, kind)
-    except msgspec.ValidationError as error:
-        raise WrongParameter(str(error)) from None

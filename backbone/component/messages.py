@@ -105,7 +105,13 @@ class Register(Message, frozen=True):
 
 
 class Registered(Message, frozen=True):
-    """Answer to ``Register``: the component holds the name until its liveliness token ends."""
+    """Answer to ``Register``: the component holds the name until its liveliness token ends.
+
+    Attributes:
+        stop: The emergency stop that was in force on the former component of this name; None: none, or not known.
+    """
+
+    stop: StandingStop | None = None
 
 
 class NameTaken(Refusal):

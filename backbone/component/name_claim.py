@@ -5,7 +5,7 @@ from __future__ import annotations
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
-from backbone.component.messages import ComponentState, NameTaken, Register, Registered
+from backbone.component.messages import ComponentState, NameTaken, Register, Registered, StandingStop
 from backbone.naming import claim_address
 from backbone.operating_system.processes import exists
 
@@ -14,8 +14,11 @@ REGISTER_AGAIN_S = 0.1  # chosen: the nameserver forgets a name without a claim 
 REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
 
 
-async def claim_name(bus: Bus, clock: Clock, state: ComponentState) -> None:
+async def claim_name(bus: Bus, clock: Clock, state: ComponentState) -> StandingStop | None:
     """Register the name and declare its claim, so that the nameserver also sees a death before readiness.
+
+    Returns:
+        The emergency stop that was in force on the former component of this name.
 
     Raises:
         NameTaken: A living component has the name.
@@ -24,7 +27,7 @@ async def claim_name(bus: Bus, clock: Clock, state: ComponentState) -> None:
     until_s = clock.now_s() + REGISTER_WITHIN_S * clock.rate
     while True:
         try:
-            await ask_until_answered(
+            registered = await ask_until_answered(
                 bus, clock, NAMESERVER, Register(state), Registered, each_s=REGISTER_EACH_S, within_s=REGISTER_WITHIN_S
             )
             break
@@ -33,6 +36,7 @@ async def claim_name(bus: Bus, clock: Clock, state: ComponentState) -> None:
                 raise
         await clock.sleep_s(REGISTER_AGAIN_S * clock.rate)
     bus.declare_alive(claim_address(state.address, state.host, state.pid))
+    return registered.stop
 
 
 def _is_of_the_dead(taken: NameTaken, host: str) -> bool:

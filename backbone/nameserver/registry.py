@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from backbone.component.messages import ComponentState, LifeState, NameTaken
+from backbone.component.messages import ComponentState, LifeState, NameTaken, StandingStop
 from backbone.nameserver.messages import Appeared, Components, Disappeared, UnknownName
 from backbone.naming import component_of, did_you_mean
 
@@ -88,6 +88,7 @@ class Registry:
         self._hub_since_s, self._complete_from_s = hub_since_s, hub_since_s + reconnect_s
         self._entries: dict[str, _Entry] = {}
         self._introducing: set[str] = set()
+        self._stops: dict[str, StandingStop] = {}
 
     # ------------------------------------------------------------------ events
     def registered(self, newcomer: ComponentState, now_s: float) -> None:
@@ -144,7 +145,7 @@ class Registry:
             return []
         if _is_held_by_another(entry, state):  # this one was cut off when its name was given away
             return []
-        entry.state = state
+        self._record(entry, state)
         if entry.announced:
             return []
         entry.announced = True
@@ -163,9 +164,13 @@ class Registry:
             and entry.state is not None
             and _same_process(entry.state, state)
         ):
-            entry.state = state
+            self._record(entry, state)
 
     # ------------------------------------------------------------------ questions
+    def stop_of(self, name: str) -> StandingStop | None:
+        """Return the emergency stop in force on the component of this name, or on its last one."""
+        return self._stops.get(name)
+
     def is_unknown(self, address: str) -> bool:
         """Return whether a token exists at this address without a known component."""
         entry = self._entries.get(component_of(address))
@@ -209,6 +214,13 @@ class Registry:
         return now_s >= self._complete_from_s and not self._introducing
 
     # ------------------------------------------------------------------
+    def _record(self, entry: _Entry, state: ComponentState) -> None:
+        entry.state, name = state, component_of(state.address)
+        if state.stop is not None:
+            self._stops[name] = state.stop  # kept after its end, because the next one may start on another host
+        else:
+            self._stops.pop(name, None)
+
     def _token_fell(self, name: str, address: str, now_s: float) -> list[Instruction]:
         self._introducing.discard(address)
         entry = self._entries.get(name)

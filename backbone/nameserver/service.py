@@ -149,7 +149,7 @@ class Nameserver(Component[NameserverParameters]):
             raise
         self._registrations += 1
         self.story.note(name, f"registered as {component.address} on {component.host}, pid {component.pid}")
-        return Registered()
+        return Registered(self._registry.stop_of(name))
 
     def _claim_changed(self, claim: str, stands: bool) -> None:
         try:

@@ -12,12 +12,10 @@ import asyncio
 import functools
 import logging
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
-from backbone.atomic_file import replace_file
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import StandingStop
@@ -31,6 +29,7 @@ from resource_pool.holds import Hold
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, AskReadings, LoadPacket, NotFromYou, PacketLoaded
 from resource_pool.resource_controller import RcParameters, ResourceController
 from resource_pool.robot_reports import RobotReports
+from resource_pool.stop_file import StopFile
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop, EmergencyQuestion, EmergencyStop, GivenBeforeStop, LiftStop, StopState
 
@@ -95,8 +94,8 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._at_rest_s = self._born_s + self.moves_on_s
         self._frequency = ""
         self._timeouts = 0
-        self._stop_file = Path(launch.run_directory) / "stops" / self.name if launch.run_directory else None
-        self._latch = StopLatch(self.name, _read_stop(self._stop_file))
+        self._stop_file = StopFile(launch.run_directory, self.name)
+        self._latch = StopLatch(self.name, self._stop_file.read())
         self._reports = RobotReports(
             self.name,
             bus,
@@ -105,6 +104,11 @@ class RobotRc(ResourceController[P], Generic[P]):
             alarm_share=self.parameters.battery_alarm_share,
             say=functools.partial(self.publish_event, self.name),
         )
+
+    def resume_stop(self, stop: StandingStop) -> None:
+        """Stay stopped if the RC's former process was stopped after the last stop that this host knows."""
+        if self._latch.resume(stop):
+            self._keep_stop()
 
     async def connect(self) -> None:
         """Also subscribe to the robot's replies."""
@@ -304,11 +308,8 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     def _keep_stop(self) -> None:
         """Save the stop for the next process of this RC; a write error must not prevent the stop."""
-        if self._stop_file is None:
-            return
         try:
-            self._stop_file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            replace_file(self._stop_file, msgspec.msgpack.encode(self._latch.state), is_lasting=False)
+            self._stop_file.write(self._latch.state)
         except OSError as error:
             news = "is stopped" if self._latch.state.is_stopped else "is free again"
             self.publish_event(
@@ -386,14 +387,3 @@ class RobotRc(ResourceController[P], Generic[P]):
     def _silent_too_long(self) -> bool:
         """Return whether no command has arrived during the sleep."""
         return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s
-
-
-def _read_stop(file: Path | None) -> StopState | None:
-    """Return the stop that an earlier process of this RC saved; an unreadable file counts as a stop."""
-    if file is None or not file.exists():
-        return None
-    try:
-        return msgspec.msgpack.decode(file.read_bytes(), type=StopState)
-    except (OSError, msgspec.DecodeError) as error:
-        log.error("%s: %s", file, error)
-        return StopState(file.name, True, 1, "unknown", "the file of an earlier stop cannot be read", 0.0)

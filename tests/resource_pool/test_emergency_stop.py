@@ -38,6 +38,22 @@ def payloads(pool: Pool, network_id: int) -> list[bytes]:
     return [packet.payload for packet in pool.radio_driver.heard_by(network_id)]
 
 
+def scout_launch(run_directory: Path, host: str = "local") -> Launch:
+    return Launch(
+        "local",
+        Subsystem.RESOURCE_POOL,
+        "scout1",
+        "scout",
+        "x:Y",
+        host,
+        "",
+        0.0,
+        1.0,
+        HARDWARE[0].rc_parameters(),
+        run_directory=str(run_directory),
+    )
+
+
 # ---------------------------------------------------------------------- the robot
 def test_a_stop_without_a_grant_halts_the_holders_robot_and_tells_the_holder_who_and_why(local_mission: Any) -> None:
     async def main() -> None:
@@ -156,19 +172,7 @@ def test_a_stop_the_radio_does_not_take_is_told_as_unconfirmed_and_the_robot_sta
 def test_a_stop_outlives_the_process_of_the_robots_rc(local_mission: Any, beside: Any, tmp_path: Path) -> None:
     async def main() -> None:
         async with a_pool(local_mission, ["radio"]) as pool:
-            launch = Launch(
-                "local",
-                Subsystem.RESOURCE_POOL,
-                "scout1",
-                "scout",
-                "x:Y",
-                "local",
-                "",
-                0.0,
-                1.0,
-                HARDWARE[0].rc_parameters(),
-                run_directory=str(tmp_path),
-            )
+            launch = scout_launch(tmp_path)
             operator = pool.voice_of(OPERATOR)
             async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
                 stop = await stop_robot(operator, "scout1", "fire", "anna")
@@ -181,6 +185,34 @@ def test_a_stop_outlives_the_process_of_the_robots_rc(local_mission: Any, beside
     run_virtual(main())
 
 
+def test_a_stop_stays_in_force_on_another_host(local_mission: Any, beside: Any, tmp_path: Path) -> None:
+    """Host b was the robot's before, and knows an older stop that was lifted there."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"]) as pool:
+            here, there = scout_launch(tmp_path / "a"), scout_launch(tmp_path / "b", "b")
+            operator = pool.voice_of(OPERATOR)
+
+            def scout(launch: Launch) -> Scout:
+                return Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)
+
+            async with beside(scout(there)):
+                await lift_stop(operator, await stop_robot(operator, "scout1", "smoke", "ben"))
+            async with beside(scout(here)):
+                await stop_robot(operator, "scout1", "", "ben")
+                stop = await stop_robot(operator, "scout1", "fire", "anna")
+                await pool.clock.sleep_s(0.1)
+            async with beside(scout(there)):
+                state = await ask_stop(operator, "scout1")
+                assert (state.is_stopped, state.number, state.by) == (True, stop.number, "ben, anna")
+                await lift_stop(operator, state)
+                await pool.clock.sleep_s(0.1)
+            async with beside(scout(scout_launch(tmp_path / "c"))):
+                assert not (await ask_stop(operator, "scout1")).is_stopped
+
+    run_virtual(main())
+
+
 def test_a_full_disk_keeps_no_wheel_turning_and_it_is_told_that_the_stop_is_not_kept(
     local_mission: Any, beside: Any, tmp_path: Path
 ) -> None:
@@ -188,19 +220,7 @@ def test_a_full_disk_keeps_no_wheel_turning_and_it_is_told_that_the_stop_is_not_
 
     async def main() -> None:
         async with a_pool(local_mission, ["radio"]) as pool:
-            launch = Launch(
-                "local",
-                Subsystem.RESOURCE_POOL,
-                "scout1",
-                "scout",
-                "x:Y",
-                "local",
-                "",
-                0.0,
-                1.0,
-                HARDWARE[0].rc_parameters(),
-                run_directory=str(tmp_path),
-            )
+            launch = scout_launch(tmp_path)
             async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)) as scout:
                 assert (await stop_robot(pool.voice_of(OPERATOR), "scout1", "fire", "anna")).is_stopped
                 assert any("will not know that scout1 is stopped" in one.what for one in scout.story.of("scout1"))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.component.messages import ComponentState, LifeState, NameTaken
+from backbone.component.messages import ComponentState, LifeState, NameTaken, StandingStop
 from backbone.errors import Refusal
 from backbone.nameserver.messages import Appeared, Disappeared, UnknownName
 from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Introduce, Registry
@@ -182,6 +183,22 @@ def test_what_is_said_about_readiness_counts_only_under_a_token() -> None:
     registry.token_changed("resource_pool/scout1", stands=True, now_s=2.0)
     registry.status_published(ComponentState("resource_pool/scout1", "scout", "a", 1, LifeState.READY, 2.0, "drives"))
     assert registry.resolve("scout1", 2.0).feedback == "drives"
+
+
+@pytest.mark.parametrize("how", ["published", "introduced"])
+def test_the_stop_of_the_last_component_of_a_name_is_kept_until_it_is_lifted(how: str) -> None:
+    registry, stop = Registry(0.0, 0.0), StandingStop(3, "anna", "fire", 1.0)
+    tell = {"published": registry.status_published, "introduced": registry.introduced}[how]
+    first, second = state(), state(pid=2, host="b")
+    begun(registry, first)
+    registry.token_changed(first.address, stands=True, now_s=1.0)
+    tell(msgspec.structs.replace(first, stop=stop))
+    gone(registry, first)
+    begun(registry, second)
+    assert (registry.stop_of("scout1"), registry.stop_of("scout2")) == (stop, None)
+    registry.token_changed(second.address, stands=True, now_s=2.0)
+    tell(second)
+    assert registry.stop_of("scout1") is None
 
 
 def test_a_restarted_hub_learns_who_is_behind_the_tokens_that_come_back() -> None:
