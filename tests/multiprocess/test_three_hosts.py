@@ -9,7 +9,8 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -19,9 +20,11 @@ from three_hosts import NAME, Copies, ThreeHosts, machines, mission_on_three_hos
 from backbone.addresses import LAUNCHER
 from backbone.authentication import secret_of, socket_endpoint
 from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskState, ComponentState
 from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
+from resource_pool.arc_client import ask_stop, lift_stop, stop_robot
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 
@@ -98,6 +101,7 @@ def test_a_link_cut_heals(mission: ThreeHosts, cut_s: float) -> None:
 @pytest.mark.alone
 @pytest.mark.parametrize("away_s", [1.0, pytest.param(20.0, marks=pytest.mark.slow)])
 def test_a_host_that_dies_and_is_back_gets_its_components_again(mission: ThreeHosts, away_s: float) -> None:
+    stop = asyncio.run(stopped(mission, "scout2"))
     with Copies(mission.hosts) as copies:
         mission.hosts["far"].die()
         time.sleep(away_s)
@@ -106,6 +110,22 @@ def test_a_host_that_dies_and_is_back_gets_its_components_again(mission: ThreeHo
         print(f"dead for {away_s} s: whole {took_s:.1f} s after it is back, copies {dict(copies.longest_s)}")
         assert took_s < (HEALED_WITHIN_S if away_s > 1 else ON_A_BUSY_MACHINE_S), mission.story()
         assert mission.components()["scout2"]["host"] == "far"
+    assert asyncio.run(lifted(mission, "scout2")) == stop, "a new machine knows nothing of the stop by itself"
+
+
+async def stopped(mission: ThreeHosts, robot: str) -> tuple[int, str]:
+    async with operator(mission) as bus:
+        state = await stop_robot(bus, robot, "fire", "anna")
+    return state.number, state.reason
+
+
+async def lifted(mission: ThreeHosts, robot: str) -> tuple[int, str]:
+    """Lift the stop in force; return its number and reason."""
+    async with operator(mission) as bus:
+        state = await ask_stop(bus, robot)
+        assert state.is_stopped
+        await lift_stop(bus, state, "anna")
+    return state.number, state.reason
 
 
 @pytest.mark.thorough
@@ -200,15 +220,21 @@ def test_two_copies_on_two_machines_are_seen(short_path: Path) -> None:
         assert 0.5 < copies.longest_s["watcher"] < 2.0
 
 
-async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
-    """Ask the launcher through the unix socket, which no namespace hides from this machine's root."""
+@asynccontextmanager
+async def operator(mission: ThreeHosts) -> AsyncIterator[Bus]:
+    """Join through the unix socket, which no namespace hides from this machine's root."""
     folder = mission.hosts["base"].runtime_folder / "scout-backbone" / NAME
     config = client_config(socket_endpoint(folder), secret_of(str(folder)))
     bus = await ZenohBus.open_when_up(NAME, "ui_console/tester", MissionClock.started_now(), config)
     try:
-        return await bus.ask(LAUNCHER, AskState(), ComponentState, within_s=5.0)
+        yield bus
     finally:
         await bus.close()
+
+
+async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
+    async with operator(mission) as bus:
+        return await bus.ask(LAUNCHER, AskState(), ComponentState, within_s=5.0)
 
 
 @pytest.mark.thorough
