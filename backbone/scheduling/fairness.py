@@ -81,8 +81,10 @@ class EqualTime:
         arc.had_s = joining_s(arc.had_s, self._others_had_s(arc, now_s))
 
     def stopped(self, arc: ArcEntry, now_s: float) -> None:
-        """Add the time since its grant to its run time."""
+        """Add the time since its grant to its run time, and limit the credit of rivals that could not run instead."""
         arc.had_s = _had_s(arc, now_s)
+        for rival in self._rivals(arc):
+            rival.had_s = max(rival.had_s, arc.had_s - arc.maximum_s - rival.maximum_s)
 
     def runs_on(self, arc: ArcEntry, waiting: Iterable[ArcEntry], now_s: float) -> bool:
         """Return whether it still precedes all rivals that wait, so that it may run on."""

@@ -50,10 +50,10 @@ class SliceExpiry:
             heapq.heappop(self._ends)
             if stands:
                 arc.awaited = wanted
-            if wanted and state.runs_on(arc):
+            if wanted and state.fairness.discipline == "time":  # each moment of running may change who is preferred
                 arc.look_s, arc.awaited = now_s + arc.minimum_s, False
                 self.wait_for(arc)
-            elif wanted:
+            if wanted and not state.runs_on(arc):
                 state.held_alone &= ~arc.excludes
                 state.concerns(arc.uses)
         return None

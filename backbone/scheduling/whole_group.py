@@ -16,13 +16,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
-from backbone.scheduling.entries import CONNECTED, ArcEntry
+from backbone.scheduling.entries import CONNECTED, INSTANT_S, ArcEntry
 from backbone.scheduling.groups import Group
 from backbone.scheduling.plan import GroupPlans, Plan
 from backbone.scheduling.planner import Slot, Turn, in_order_of_revocation
 from backbone.scheduling.precedence import by_precedence
+from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
 
@@ -99,10 +100,13 @@ class WholeGroupPlanner:
             if self._in_turn(turn, group, now_s) and not self._table.runs_on(turn):
                 return turn
             queued.remove(turn.arc)
-        in_turns = GroupPlans(self._table, _in_turns(group), group.arcs, now_s, slack_s=self._slack_s)
-        turn = in_turns.due(in_turns.order, possible)
-        only_lower = turn is not None and all(turn.arc.goes_before(holder) for holder in turn.in_the_way)
-        return turn if only_lower else None  # it harms no equal: it starts in a gap, or preempts lower ARCs
+        in_turns = GroupPlans(self._table, _in_turns(group.arcs, now_s), group.arcs, now_s, slack_s=self._slack_s)
+        queued = in_turns.order[:]
+        while (turn := in_turns.due(queued, possible)) is not None:
+            if all(turn.arc.goes_before(holder) for holder in turn.in_the_way):
+                return turn  # it harms no equal: it starts in a gap, or preempts lower ARCs
+            queued.remove(turn.arc)
+        return None
 
     def _forget_outdated(self) -> None:
         if self._planned != self._state.version:
@@ -115,21 +119,34 @@ class WholeGroupPlanner:
         RCs become free as whole sets. If the ARC with the least time would not get all its RCs by a turn, it ends no
         slice. Nor does it start in a gap that higher ARCs will need.
         """
-        order = _in_turns(group)
-        plan = functools.partial(Plan, self._table, order, now_s=now_s, slack_s=0.0, handed_over=True)
-        if plan(group=group.arcs).start_s(turn.arc) == math.inf:
+        order = _in_turns(group.arcs, now_s)
+        plan = functools.partial(Plan, self._table, now_s=now_s, slack_s=0.0, handed_over=True)
+        if plan(order, group=group.arcs).start_s(turn.arc) == math.inf:
             return False
-        rest = [*group.arcs]
+        if self._delays_higher(turn.arc, order, group, now_s):
+            return False
+        rest, ended = [*group.arcs], set[ArcEntry]()
         for holder in in_order_of_revocation(turn):
             keepers = [arc for arc in rest if arc.state in CONNECTED]
-            now = plan(group=rest)
-            due = [arc for arc in order if now.starts_now(arc)]
-            entitled = [arc for arc in due if arc.touches & holder.touches and _may_displace(arc, holder, now_s)]
-            if not any(self._needs_more(arc, keepers, due) for arc in entitled):
+            now = plan(_in_turns(group.arcs, now_s, ended), group=rest)
+            due = [arc for arc in order if arc.state is RequestState.WAITING and now.starts_now(arc)]
+            rivals = [arc for arc in due if arc.touches & holder.touches and _may_displace(arc, holder, now_s)]
+            entitled = [arc for arc in rivals if self._needs_more(arc, keepers, due)]
+            if not (entitled if holder.served(now_s) else turn.arc in entitled[:1]):  # preempted for the first of them
                 return False
-            if not turn.arc.goes_before(holder):
-                rest.remove(holder)
+            rest.remove(holder)
+            ended.add(holder)
         return True
+
+    def _delays_higher(self, arc: ArcEntry, order: list[ArcEntry], group: Group[ArcEntry], now_s: float) -> bool:
+        """Return whether a start now would delay a higher ARC that waits."""
+        higher = [other for other in order if other.state is RequestState.WAITING and other.goes_before(arc)]
+        if not higher:
+            return False
+        without = Plan(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
+        first = [arc, *(other for other in order if other is not arc)]
+        after = Plan(self._table, first, group.arcs, now_s, slack_s=self._slack_s)
+        return any(after.start_s(other) > without.start_s(other) + INSTANT_S for other in higher)
 
     def _needs_more(self, arc: ArcEntry, keepers: Sequence[ArcEntry], due: Sequence[ArcEntry]) -> bool:
         """Return whether the ARC does not fit beside the holders, or not beside holders and other due ARCs."""
@@ -191,11 +208,19 @@ def _may_displace(arc: ArcEntry, holder: ArcEntry, now_s: float) -> bool:
     return arc.goes_before(holder) or (holder.served(now_s) and not holder.goes_before(arc))
 
 
-def _in_turns(group: Group[ArcEntry]) -> list[ArcEntry]:
-    """Return the queued ARCs in the order that they would have if equals took turns."""
+def _in_turns(group: Iterable[ArcEntry], now_s: float, ended: Collection[ArcEntry] = ()) -> list[ArcEntry]:
+    """Return the queued ARCs in the order that they would have if equals took turns.
 
-    def seniority(arc: ArcEntry) -> tuple[float, int]:
+    Args:
+        group: Active ARCs.
+        now_s: Present time.
+        ended: Holders that count as queued, because they are revoked now.
+    """
+
+    def seniority(arc: ArcEntry) -> tuple[float, float]:
+        if arc in ended and arc.served(now_s):
+            return (now_s, math.inf)
         is_first = arc.reservation is not None and arc.has_forced
         return (-math.inf, arc.reservation or 0) if is_first else arc.stamp
 
-    return by_precedence([arc for arc in group.arcs if arc.queued], lambda arc: arc.path, seniority)
+    return by_precedence([arc for arc in group if arc.queued or arc in ended], lambda arc: arc.path, seniority)

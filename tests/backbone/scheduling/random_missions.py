@@ -44,13 +44,7 @@ def random_mission(
     requests = [request for request in asked if _can_ever_run(bench, request)][:8]
     if not requests:
         return bench, []
-    happens: list[tuple[float, Event]] = [(_time(rng, 8.0) if rng.random() < 0.5 else 0.0, r) for r in requests]
-    whims = [(_time(rng), _whim(rng, rng.choice(requests))) for _ in range(rng.choice([0, 0, 2, 6]))]
-    # A repeated request would make shorter again what was made longer; the checker knows only the last length.
-    changing = {whim.arc for _, whim in whims if isinstance(whim, RuntimeChanged)}
-    happens += [
-        (time_s, whim) for time_s, whim in whims if not (isinstance(whim, Requested) and whim.request.arc in changing)
-    ]
+    happens = _happens(rng, requests, [0, 0, 2, 6])
     if faults:
         for _ in range(rng.choice([0, 0, 0, 1, 2])):
             happens += _fault(rng, rng.choice(rcs))
@@ -60,10 +54,42 @@ def random_mission(
     return bench, sorted(happens, key=lambda item: item[0])
 
 
+def crowded_mission(rng: Random, **rules: Any) -> tuple[Bench, list[tuple[float, Event]]]:
+    """Return a bench as ``random_mission``, with 8 to 24 ARCs and up to 14 RCs."""
+    rcs = [_rc(rng, number) for number in range(rng.randint(3, 14))]
+    grace_s = rng.choice([0.0, 0.0, 0.2])
+    bench = Bench(
+        manager(grace_s=grace_s, **rules),
+        *rcs,
+        pause_s=lambda deadline_s: rng.choice([0.0, deadline_s / 2, deadline_s]),
+    )
+    level = rng.choice([1, 2, 3])
+    tree = {f"p{number}": rng.randint(1, level) for number in range(rng.randint(1, 5))}
+    asked = [_request(rng, number, rcs, tree, level) for number in range(rng.randint(8, 24))]
+    requests = [request for request in asked if _can_ever_run(bench, request)]
+    if not requests:
+        return bench, []
+    happens = _happens(rng, requests, [0, 2, 6, 12])
+    for _ in range(rng.choice([0, 0, 1, 2])):
+        happens += _fault(rng, rng.choice(rcs))
+    return bench, sorted(happens, key=lambda item: item[0])
+
+
 def play(bench: Bench, happens: list[tuple[float, Event]], until_s: float = END_S) -> Bench:
     for time_s, event in happens:
         bench.at(time_s, event)
     return bench.run(until_s)
+
+
+def _happens(rng: Random, requests: list[Requested], whims: list[int]) -> list[tuple[float, Event]]:
+    """Return the requests, and as many whims of theirs as one of these numbers."""
+    happens: list[tuple[float, Event]] = [(_time(rng, 8.0) if rng.random() < 0.5 else 0.0, r) for r in requests]
+    changes = [(_time(rng), _whim(rng, rng.choice(requests))) for _ in range(rng.choice(whims))]
+    # A repeated request would make shorter again what was made longer; the checker knows only the last length.
+    changing = {whim.arc for _, whim in changes if isinstance(whim, RuntimeChanged)}
+    return happens + [
+        (time_s, whim) for time_s, whim in changes if not (isinstance(whim, Requested) and whim.request.arc in changing)
+    ]
 
 
 def _can_ever_run(bench: Bench, request: Requested) -> bool:

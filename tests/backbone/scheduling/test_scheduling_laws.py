@@ -13,7 +13,7 @@ import pytest
 from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_missions import END_S, play, random_mission
+from random_missions import END_S, crowded_mission, play, random_mission
 from simulated_switches import Bench, ask, load, manager, sharable, unit
 from trace_checker import Violation
 
@@ -89,6 +89,31 @@ def test_the_checker_finds_nothing_under_equal_time(seed):
 def test_equal_time_ends_a_slice_and_starts_in_a_gap_only_where_turns_would(seed):
     """One in a hundred missions had an end that no ARC was entitled to, or a gap that stayed empty."""
     assert violations(play(*random_mission(Random(seed), discipline="time"))) == []
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(83, id="an end for an ARC that an ended one goes before"),
+        pytest.param(133, id="a gap that stays empty"),
+        pytest.param(204, id="a start in a gap that a higher ARC will need"),
+        pytest.param(211, id="a slice that was over before anyone waited, and that is never looked at again"),
+        pytest.param(380, id="an end for an ARC that needs only another end"),
+        pytest.param(735, id="RCs freed by force for another than the first in turn"),
+    ],
+)
+def test_equal_time_keeps_the_rules_in_a_crowd(seed):
+    assert violations(play(*crowded_mission(Random(seed), discipline="time"))) == []
+
+
+def test_an_arc_has_no_credit_for_time_in_which_a_third_one_kept_it_from_running():
+    assert violations(play(*random_mission(Random(2324), discipline="time"))) == []
+
+
+@settings(max_examples=share(10))
+@given(seeds)
+def test_the_checker_finds_nothing_in_a_crowd_under_equal_time(seed):
+    assert violations(play(*crowded_mission(Random(seed), discipline="time"))) == []
 
 
 RIVALS = st.lists(st.tuples(st.sampled_from([1.0, 2.0, 2.5, 5.0]), st.integers(0, 12)), min_size=2, max_size=6)
