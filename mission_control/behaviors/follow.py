@@ -56,13 +56,12 @@ class Follow(Driver[FollowParameters]):
 
     async def drive_on(self, robot: str) -> None:
         """Decide ten times a second from both positions; see ``Driver.drive_on``."""
-        given = self.parameters
-        if given.target == robot:
-            self.give_up(FollowsItself(f"{robot} is the target of {self.name}"))
-            return
-        self.report(f"{robot} follows {given.target}")
         while True:
             given = self.parameters
+            if given.target == robot:
+                self.give_up(FollowsItself(f"{robot} is the target of {self.name}"))
+                return
+            self.report(f"{robot} follows {given.target}")
             of_target = await self.locate(given.localizer, given.target)
             position = await self.locate(given.localizer, robot)
             target = FloorPoint(of_target.x_m, of_target.y_m)

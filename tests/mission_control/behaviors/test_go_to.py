@@ -206,7 +206,7 @@ def test_a_new_place_while_it_goes_is_where_it_goes() -> None:
     run_virtual(scene())
 
 
-async def set_parameter(running: RunningMission, name: str, parameter: str, value: float) -> None:
+async def set_parameter(running: RunningMission, name: str, parameter: str, value: float | str) -> None:
     await running.bus.ask(f"mission_control/{name}", SetParameter(parameter, value), Parameters, within_s=1.0)
 
 
@@ -289,6 +289,20 @@ def test_a_target_that_cannot_be_followed_ends_it_with_the_reason(target: str, c
             behavior = await finished(running, FOLLOW, 10.0)
             assert isinstance(behavior, Follow)
             assert (behavior.status, behavior.payload["code"]) == (BehaviorStatus.FAILURE, code)
+
+    run_virtual(scene())
+
+
+def test_a_new_target_is_named_and_the_robot_itself_ends_it() -> None:
+    async def scene() -> None:
+        async with at_work(only(FOLLOW)) as running:
+            behavior: Any = running.component(FOLLOW)
+            await wait_until(running, lambda: behavior.feedback == "scout2 follows scout1", 10.0)
+            await set_parameter(running, FOLLOW, "target", "shelf")
+            await wait_until(running, lambda: behavior.feedback == "scout2 follows shelf", 1.0)
+            await set_parameter(running, FOLLOW, "target", "scout2")
+            await finished(running, FOLLOW, 1.0)
+            assert (behavior.status, behavior.payload["code"]) == (BehaviorStatus.FAILURE, "follow.itself")
 
     run_virtual(scene())
 
