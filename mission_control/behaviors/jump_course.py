@@ -114,7 +114,7 @@ class JumpCourse:
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision depends only on its position then."""
         self._freeing, self._is_seen_landing = None, False
-        self._watchdog.rest()
+        self._watchdog.pause()
         if self.stage is not JumpStage.AIRBORNE and not self.is_final:
             self.stage = JumpStage.RUN_UP
 

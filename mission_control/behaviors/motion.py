@@ -172,11 +172,21 @@ class Watchdog:
         self.rest()
 
     def rest(self) -> None:
-        """Restart the time, because the goal changed or the robot was not driven for a while."""
-        self._nearest_m, self._since_s = math.inf, math.inf
+        """Restart the time, because the goal changed or the robot was not driven to it for a while."""
+        self._nearest_m = self._since_s = self._last_m = math.inf
+        self._last_s, self._is_paused = -math.inf, False
+
+    def pause(self) -> None:
+        """Stop the time until the next decision; it restarts if the robot's distance has changed by then."""
+        self._is_paused = True
 
     def is_stuck(self, distance_m: float, now_s: float) -> bool:
         """Return True if the robot has not come nearer within ``patience_s``; called at every decision."""
+        if self._is_paused and abs(distance_m - self._last_m) >= self.STEP_M:
+            self.rest()
+        elif self._is_paused:
+            self._since_s, self._is_paused = self._since_s + now_s - self._last_s, False
+        self._last_m, self._last_s = distance_m, now_s
         if distance_m <= self._nearest_m - self.STEP_M:
             self._nearest_m, self._since_s = distance_m, now_s
         return now_s - self._since_s >= self._patience_s

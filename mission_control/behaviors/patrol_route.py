@@ -94,7 +94,7 @@ class PatrolRoute:
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision continues from its position then."""
         self._decided_s = self._freeing = None
-        self._watchdog.rest()
+        self._watchdog.pause()
 
     def decide(self, position: Position, now_s: float) -> Motion:
         """Return the next motion; record a way point that is reached.
@@ -126,11 +126,11 @@ class PatrolRoute:
     def _go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
         if self._freeing is None and self._watchdog.is_stuck(goal.distance_m(position), now_s):
             self._freeing = shake_free()
+            self._watchdog.rest()
             self.freed += 1
         if self._freeing is not None:
             motion = self._freeing.motion(now_s)
             if motion is not None:
                 return motion
             self._freeing = None
-            self._watchdog.rest()
         return head_for(position, goal, self._speed_m_s)

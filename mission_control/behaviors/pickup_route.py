@@ -46,7 +46,7 @@ class PickupRoute:
         if self.stage is not PickupStage.FAILED:
             self.stage = PickupStage.UNKNOWN
         self._freeing = None
-        self._watchdog.rest()
+        self._watchdog.pause()
 
     def not_found(self) -> None:
         """Record an unsuccessful search all around."""
@@ -70,10 +70,10 @@ class PickupRoute:
             return Motion()
         if self._freeing is None and self._watchdog.is_stuck(distance_m, now_s):
             self._freeing = shake_free()
+            self._watchdog.rest()
         if self._freeing is not None:
             motion = self._freeing.motion(now_s)
             if motion is not None:
                 return motion
             self._freeing = None
-            self._watchdog.rest()
         return head_for(position, self._near, self._speed_m_s)

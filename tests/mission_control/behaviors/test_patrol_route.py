@@ -125,6 +125,23 @@ def test_a_watchdog_bites_only_after_its_patience_without_progress() -> None:
     assert not watchdog.is_stuck(0.55, 100.0)
 
 
+@given(st.floats(0.2, 6.0), st.floats(0.1, 30.0))
+def test_a_watchdog_counts_the_time_of_many_short_slices(slice_s: float, pause_s: float) -> None:
+    """A robot that has not moved in a pause stays stuck; one that was moved gets all the patience again."""
+    watchdog, now_s, driven_s = Watchdog(4.0), 0.0, 0.0
+    while not watchdog.is_stuck(0.55, now_s):
+        pauses = int((driven_s + STEP_S) / slice_s) > int(driven_s / slice_s)
+        if pauses:
+            watchdog.pause()
+        now_s, driven_s = now_s + (pause_s if pauses else STEP_S), driven_s + STEP_S
+        assert driven_s < 60.0
+    assert driven_s > 3.9
+    watchdog.pause()
+    assert not watchdog.is_stuck(0.45, now_s + pause_s)
+    assert not watchdog.is_stuck(0.45, now_s + pause_s + 3.9)
+    assert watchdog.is_stuck(0.45, now_s + pause_s + 4.1)
+
+
 def test_an_undisturbed_patrol_reaches_every_way_point_in_order_and_is_over() -> None:
     patrol = route(SQUARE, rounds=2)
     position, now_s = drive(patrol, Position(0.5, 0.5, 0.0), 0.0, 300.0)

@@ -75,6 +75,17 @@ def test_a_robot_that_gets_no_nearer_fails_after_its_shakes() -> None:
     assert one.decide(Position(0, 0, 0), now_s) == STILL
 
 
+def test_a_robot_that_gets_no_nearer_fails_in_slices_shorter_than_its_patience_too() -> None:
+    one, now_s = way(FloorPoint(3, 0)), 0.0
+    while not one.is_over and now_s < 200:
+        one.interrupt()
+        for _ in range(20):
+            one.decide(Position(0, 0, 0), now_s)
+            now_s += STEP_S
+        now_s += 2.0
+    assert "3.00 m are left" in one.failure
+
+
 def test_a_robot_that_a_shake_frees_goes_on() -> None:
     """Stuck again and again, each time further on."""
     one, now_s, x_m = way(FloorPoint(3, 0)), 0.0, 0.0
