@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mission_control.behaviors.motion import STILL, Motion, turned
+from mission_control.behaviors.patrol_route import LONGEST_STEP_S
 
 Picture = NDArray[np.uint8]
 
@@ -35,7 +36,6 @@ IN_M, BACK_M = 0.35, 0.12  # chosen: three body lengths into the dark; one body 
 CERTAIN_PICTURES = 4  # chosen: torn pictures come two or three in a row
 CHOICES = 4  # chosen: the darkest direction is often a shadow line; then other directions are tried
 BARRED_RAD = math.radians(60.0)  # chosen: excludes the way back to the last place
-LONGEST_STEP_S = 0.2  # chosen: if pictures are further apart, the robot may have stood still in between
 SAME_VIEW, VIEW_COLUMNS, VIEW_ROWS = 9.0, 40, 15  # chosen: grey levels between views of 8 by 16 pixels
 SHIFTS = 8  # chosen: columns of such a view, 8 degrees; a robot stopped in a turn coasts less than that
 COMPARED = 10  # chosen: the first pictures after switching on roll

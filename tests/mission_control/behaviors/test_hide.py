@@ -120,6 +120,17 @@ def test_a_look_around_goes_on_over_many_short_slices_if_the_robot_is_not_moved(
     assert search.stage in (SearchStage.TURN, SearchStage.GO)
 
 
+@pytest.mark.parametrize("picture_rate_hz", [1.0, 2.0, 3.0, 4.0, 15.0])
+def test_a_look_around_is_one_turn_at_any_picture_rate(picture_rate_hz: float) -> None:
+    """A robot obeys a motion for half a second, or until the next picture."""
+    search, turned_rad, pictures = dark_search(), 0.0, 0
+    seen = PlayedRoom(Position(60.0, 60.0, 0.0)).seen()
+    while search.stage is SearchStage.LOOK:
+        motion = search.decide(seen, pictures / picture_rate_hz)
+        turned_rad, pictures = turned_rad + motion.turn_rad_s * min(0.5, 1 / picture_rate_hz), pictures + 1
+    assert 2 * math.pi <= turned_rad < 2 * math.pi + 1.0
+
+
 def test_a_robot_that_was_carried_away_looks_around_anew() -> None:
     search, room = dark_search(), PlayedRoom(Position(1.5, 1.5, 0.0))
     go_on(search, room, 12.0)
