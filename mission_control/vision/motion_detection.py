@@ -168,7 +168,7 @@ def _like(average: NDArray[np.float32], pictures: Sequence[NDArray[np.float32]])
 
 
 def _edges_moved(average: NDArray[np.float32], pictures: Sequence[NDArray[np.float32]]) -> list[float]:
-    edges = cv2.absdiff(average[:, 1:], average[:, :-1]) > EDGE_LEVELS
+    edges = np.abs(average[:, 1:] - average[:, :-1]) > EDGE_LEVELS  # OpenCV refuses a picture of one column
     if (count := int(np.count_nonzero(edges))) < LEAST_EDGES_PX:
         return [0.0] * len(pictures)
     differ = [cv2.absdiff(picture, average) > EDGE_LEVELS for picture in pictures]

@@ -218,6 +218,12 @@ def test_a_streak_is_no_body() -> None:
     assert largest_blob(changed) == Blob(40, 40, 16, 20, 320)
 
 
+@pytest.mark.parametrize("shape", [(2, 2), (3, 3), (240, 2), (2, 320)])
+def test_the_smallest_pictures_are_judged_too(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(0)
+    assert not any(look_at([rng.integers(0, 256, shape, np.uint8) for _ in range(30)]))
+
+
 @pytest.mark.parametrize("first", [1, FAST_FRAMES - 1, FAST_FRAMES, FAST_FRAMES + 3])
 def test_a_new_shape_begins_anew_also_among_the_first_pictures(first: int) -> None:
     detector = MotionDetector()
