@@ -308,8 +308,8 @@ class Background:
                 self.begin()
             return
         self._rejected_in_turn = 0
-        assert self._average is not None  # noqa: S101  the picture was compared with it
-        cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT, mask=sound.astype(np.uint8))
+        if self._average is not None and self._average.shape == picture.shape:  # else the judgment was late
+            cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT, mask=sound.astype(np.uint8))
 
     def _settle(self, picture: NDArray[np.float32]) -> None:
         """Collect one of the first pictures after a context switch; after the last one there is an average again.

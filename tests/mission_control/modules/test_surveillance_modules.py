@@ -24,7 +24,7 @@ from mission_control.modules.run import connected
 from mission_control.modules.surveillance import Averaging, Detection, FrameDifference, Tracking
 from mission_control.modules.units_together import UnitsTogether
 from mission_control.vision.frame_averaging import FrameAveraging
-from mission_control.vision.motion_detection import REJECTED_IN_TURN, MotionDetector
+from mission_control.vision.motion_detection import FAST_FRAMES, REJECTED_IN_TURN, MotionDetector
 
 GIVEN = {"picture": type_name(GreyPicture), "swapped_in": type_name(SwappedIn)}
 WIDTH_PX, HEIGHT_PX = 160, 120
@@ -129,6 +129,22 @@ def test_an_average_that_was_handed_over_does_not_change() -> None:
         units.feed("picture", message_of(picture_of("moving", number, rng), 0.0), 0.0)
     assert len(seen) > 5
     assert all(np.array_equal(kept, copied) for kept, copied in seen)
+
+
+@pytest.mark.parametrize("late", [2, FAST_FRAMES + 2])
+def test_late_judgments_of_pictures_of_another_size_are_not_learned(late: int) -> None:
+    """Units in other threads and processes judge a picture while the next ones are averaged."""
+    averaging, detection, rng, judged = Averaging(), Detection(), np.random.default_rng(0), list[Any]()
+    compared = 0
+    for number in range(4 * FAST_FRAMES):
+        picture = message_of(picture_of("still" if number < 2 * FAST_FRAMES else "lower", number, rng), number)
+        newest = judged[-late] if len(judged) >= late else None
+        comparison = averaging.update(Averaging.Inputs(picture=picture, judgment=newest)).comparison
+        judged.append(judged[-1] if comparison is None and judged else None)
+        if comparison is not None:
+            compared += 1
+            judged[-1] = detection.update(Detection.Inputs(comparison=comparison)).judgment
+    assert compared == 2 * FAST_FRAMES
 
 
 def test_detection_shows_what_it_goes_by_and_makes_nothing_unseen() -> None:
