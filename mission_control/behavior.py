@@ -102,6 +102,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
+    fixed: ClassVar[frozenset[str]] = given_elsewhere
     accepts: ClassVar[Accepts | None] = (
         ArcNotice | ChildReport | AskBehavior | TakeBranch | BreakOff | ListViews | LookAt | SwapClass
     )

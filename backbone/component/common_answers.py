@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import msgspec
 
@@ -42,6 +42,7 @@ class Answering(Protocol):
     bus: Bus
     clock: Clock
     story: StoryBook
+    fixed: ClassVar[frozenset[str]]
 
     @property
     def parameters(self) -> msgspec.Struct:
@@ -117,6 +118,11 @@ class CommonAnswers:
         if name not in old:
             has = ", ".join(sorted(old)) or "none"
             raise WrongParameter(f"{component.launch.name} has no parameter {name!r}; it has: {has}")
+        if name in component.fixed:
+            raise WrongParameter(
+                f"{component.launch.name} cannot change {name} while it runs",
+                remedy="Start it again with the new value: 'scout-backbone tree replace', or the mission file.",
+            )
         component.change_parameters({name: value})
         component.story.note(name, f"{user} set {name} from {value_text(old[name])} to {value_text(value)}")
         return Parameters(msgspec.to_builtins(component.parameters))

@@ -69,6 +69,8 @@ class Component(Generic[P_co]):
     parameters_type: ClassVar[type[msgspec.Struct]] = NoParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset()
     """Parameters that a mission file sets by other elements and attributes, not by <parameter>."""
+    fixed: ClassVar[frozenset[str]] = frozenset()
+    """Parameters whose change has no effect while it runs; it refuses the change."""
     accepts: ClassVar[Accepts | None] = None
     """Its own questions, besides the common ones: a message class or a union of them."""
     is_robot: ClassVar[bool] = False

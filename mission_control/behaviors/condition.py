@@ -142,15 +142,15 @@ class MessageCondition(Behavior[MessageConditionParameters]):
     """Succeeds if a message passes the test. Otherwise ``check`` fails, and ``wait`` waits for the next message."""
 
     parameters_type = MessageConditionParameters
+    fixed = Behavior.fixed | {"source", "message"}
     children_allowed = (0, 0)
     may_claim = False
 
     async def start(self) -> None:
         """Subscribe to the event, or begin to ask for reports."""
         given = self.parameters
-        self._comparison = Comparison(given.field, given.above, given.below, given.equals)
         self._kind = message_class(given.message)
-        self.report(f"waits for {given.message} of {given.source}: {self._comparison}")
+        self.parameters_changed()
         if self._kind in ASKED_FOR:
             self._begin_to_ask()
             return
@@ -159,9 +159,10 @@ class MessageCondition(Behavior[MessageConditionParameters]):
         self.bus.subscribe(source, Conversation.EVENTS, known, self._heard)
 
     def parameters_changed(self) -> None:
-        """Use the new comparison from now on; a change of source or message needs a new start."""
+        """Use the new comparison from now on."""
         given = self.parameters
         self._comparison = Comparison(given.field, given.above, given.below, given.equals)
+        self.report(f"waits for {given.message} of {given.source}: {self._comparison}")
 
     def _begin_to_ask(self) -> None:
         source = _asked_at(self._kind, self.parameters.source)

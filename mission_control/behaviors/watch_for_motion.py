@@ -67,6 +67,7 @@ class WatchForMotion(Behavior[WatchParameters]):
     """
 
     parameters_type = WatchParameters
+    fixed = Behavior.fixed | {"view_s", "settling_s", "frame_rate_hz", "clean_share", "seed", "vision"}
     hands_over = frozenset({"_detector", "_pictures", "_rejected", "_robot", "_events", "_last_told_s"})
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fake_resource_pool import FakeArc, FakePlacer, Run, with_placer
 
-from backbone.component.messages import StoryEvent
+from backbone.component.messages import Parameters, SetParameter, StoryEvent, WrongParameter
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_order
 from mission_control.behaviors.skeleton import Skeleton
@@ -47,6 +47,27 @@ async def show(placer: FakePlacer, arc: FakeArc, frames: int, *, moving: bool) -
             picture[100:140, 8 * number : 8 * number + 40] = 230
         arc.publish(picture.tobytes(), **SIZE, number=number)
         await placer.clock.sleep_s(FRAME_S)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"), [("vision", "elsewhere"), ("view_s", 3.0), ("seed", 1), ("is_last", True), ("children", [])]
+)
+def test_a_watcher_refuses_what_it_cannot_change_and_watches_on(
+    placer_world: Run, parameter: str, value: object
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        watch = await placer.launch(behavior_order(watcher("scout1"), [("iros2001", 10)]))
+        await placer.wait(lambda: placer.arcs)
+        [arc] = placer.arcs.values()
+        await arc.grant()
+        with pytest.raises(WrongParameter, match=f"cannot change {parameter} while it runs"):
+            await placer.bus.ask(watch.address, SetParameter(parameter, value), Parameters, within_s=1.0)
+        await placer.bus.ask(watch.address, SetParameter("frames_wanted", 2), Parameters, within_s=1.0)
+        await show(placer, arc, 20, moving=False)
+        await show(placer, arc, 20, moving=True)
+        assert watch.statistics()["events"] == 1
+
+    placer_world(scene)
 
 
 def test_a_watcher_tells_motion_with_time_robot_and_region_and_nothing_else(placer_world: Run) -> None:

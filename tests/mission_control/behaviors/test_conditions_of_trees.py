@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 from fake_resource_pool import FakePlacer, Run
-from trees_of_components import FAILURE, SUCCESS, Battery, is_running, node, root
+from trees_of_components import FAILURE, SUCCESS, Battery, is_running, node, root, set_parameter
 
+from backbone.component.messages import WrongParameter
 from backbone.keys import Conversation
 from mission_control.behaviors.condition import Comparison, MessageConditionParameters
 from mission_control.messages import BehaviorStatus, MotionSeen, Region, WaypointReached
@@ -74,6 +75,21 @@ def test_a_condition_on_a_report_waits_for_a_behavior_that_is_not_there_yet(plac
         assert condition.status is BehaviorStatus.RUNNING
         patrol.finish(SUCCESS)
         await placer.wait(lambda: condition.status is SUCCESS, within_s=3.0)
+
+    placer_world(scene)
+
+
+def test_a_condition_tells_its_new_comparison_and_refuses_what_it_cannot_change(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        asked = {"source": "patrol", "message": "WaypointReached", "field": "number", "above": 2.0}
+        condition = await root(placer, node("condition", "done", **asked))
+        await placer.wait(lambda: condition.feedback == "waits for WaypointReached of patrol: number above 2")
+        await set_parameter(placer, "done", "above", 7.0)
+        assert condition.feedback == "waits for WaypointReached of patrol: number above 7"
+        for parameter, value in (("source", "other"), ("message", "MotionSeen"), ("keeper", "ui_console/anna")):
+            with pytest.raises(WrongParameter, match=f"cannot change {parameter} while it runs"):
+                await set_parameter(placer, "done", parameter, value)
+        assert condition.parameters.source == "patrol"
 
     placer_world(scene)
 
