@@ -45,6 +45,7 @@ class Way:
         self._decided_s: float | None = None
         self._freed = self._in_vain = 0
         self._stuck_m = math.inf
+        self._last: FloorPoint | None = None
 
     @property
     def is_there(self) -> bool:
@@ -69,6 +70,9 @@ class Way:
         """
         if self.is_over:
             return STILL
+        if self._decided_s is None and self._last is not None and self._last.distance_m(position) > GAIN_M:
+            self._in_vain, self._stuck_m = 0, math.inf  # a person has moved it: the earlier shakes say nothing here
+        self._last = FloorPoint(position.x_m, position.y_m)
         passed_s = 0.0 if self._decided_s is None else min(now_s - self._decided_s, LONGEST_STEP_S)
         self._driven_s, self._decided_s = self._driven_s + passed_s, now_s
         motion = self._route.decide(position, now_s)

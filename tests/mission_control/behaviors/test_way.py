@@ -86,6 +86,21 @@ def test_a_robot_that_gets_no_nearer_fails_in_slices_shorter_than_its_patience_t
     assert "3.00 m are left" in one.failure
 
 
+@pytest.mark.parametrize(("x_m", "has_failed"), [(2.5, True), (0.5, False)], ids=["left there", "carried back"])
+def test_shakes_in_vain_at_one_place_do_not_count_where_a_person_carried_the_robot(
+    x_m: float, has_failed: bool
+) -> None:
+    one, now_s = way(FloorPoint(3, 0)), 0.0
+    while now_s < 18.0:
+        one.decide(Position(2.5, 0, 0), now_s)
+        now_s += STEP_S
+    one.interrupt()
+    while now_s < 25.0:
+        one.decide(Position(x_m, 0, 0), now_s)
+        now_s += STEP_S
+    assert bool(one.failure) is has_failed
+
+
 def test_a_robot_that_a_shake_frees_goes_on() -> None:
     """Stuck again and again, each time further on."""
     one, now_s, x_m = way(FloorPoint(3, 0)), 0.0, 0.0
