@@ -20,6 +20,7 @@ class PickupStage(StrEnum):
     UNKNOWN = "asks where it is"
     TRAVEL = "goes to where the mark can be seen"
     BY_SIGHT = "goes by sight"
+    LOOK = "looks whether the mark is still in sight"
     FAILED = "did not find the mark"
 
 
@@ -42,11 +43,17 @@ class PickupRoute:
         self._freeing: Maneuver | None = None
 
     def interrupt(self) -> None:
-        """Record the loss of the robot; the next decision depends on its position then."""
-        if self.stage is not PickupStage.FAILED:
+        """Record the loss of the robot; its view decides how it continues, or its position then."""
+        if self.stage in (PickupStage.BY_SIGHT, PickupStage.LOOK):
+            self.stage = PickupStage.LOOK
+        elif self.stage is not PickupStage.FAILED:
             self.stage = PickupStage.UNKNOWN
         self._freeing = None
         self._watchdog.pause()
+
+    def looked(self, *, is_seen: bool) -> None:
+        """Record whether the mark is still in sight after an interruption; if not, the position decides."""
+        self.stage = PickupStage.BY_SIGHT if is_seen else PickupStage.UNKNOWN
 
     def not_found(self) -> None:
         """Record an unsuccessful search all around."""

@@ -22,6 +22,7 @@ from mission_control.behaviors.motion import Attempts, DrivingSpeed, NamedCompon
 from mission_control.behaviors.pickup_route import PickupRoute, PickupStage
 from mission_control.behaviors.servo_to_target import MOST_TURNS, Servo, ServoParameters, TargetNotFound
 from mission_control.vision.servo_law import Stage as Approach
+from mission_control.vision.skeleton_tracking import TrackingPhase
 from resource_pool.arc_client import Frame
 
 
@@ -58,8 +59,8 @@ class ReturnToPickup(Servo[PickupParameters]):
         """The state of the route."""
 
     def see(self, frame: Frame) -> None:
-        """Search and track the mark, while the robot navigates by sight."""
-        if self.route.stage is PickupStage.BY_SIGHT:
+        """Search and track the mark, while the robot navigates by sight, or looks whether it still can."""
+        if self.route.stage in (PickupStage.BY_SIGHT, PickupStage.LOOK):
             super().see(frame)
 
     async def drive_on(self, robot: str) -> None:
@@ -68,13 +69,15 @@ class ReturnToPickup(Servo[PickupParameters]):
             if self.route.stage is PickupStage.BY_SIGHT:
                 if await self._go_by_sight(robot):
                     return
+            elif self.route.stage is PickupStage.LOOK:
+                await self._look(robot)
             else:
                 await self._travel(robot)
         await self.held.halt()
         self.give_up(TargetNotFound(f"{robot} looked for the mark {self.route.in_vain} times"))
 
     def interrupted(self) -> None:
-        """Keep the state of the search, and ask where the robot is; see ``Driver.interrupted``."""
+        """Keep the state of the search; see ``Driver.interrupted``."""
         self.route.interrupt()
         super().interrupted()
 
@@ -100,6 +103,15 @@ class ReturnToPickup(Servo[PickupParameters]):
             self.look_anew()
         else:
             await self.clock.sleep_s(DECIDE_EVERY_S)
+
+    async def _look(self, robot: str) -> None:
+        """Continue by sight if a picture shows the mark before the search would turn the robot; it stands meanwhile."""
+        self.report(f"{robot} {self.route.stage}")
+        step = await self.next_step()
+        if step.track.phase is TrackingPhase.TRACKING:
+            self.route.looked(is_seen=True)
+        elif step.command.turn_rad_s:
+            self.route.looked(is_seen=False)
 
     async def _go_by_sight(self, robot: str) -> bool:
         """Carry out the decision of the next picture; return True at the mark."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import msgspec
 import pytest
@@ -41,10 +42,21 @@ def test_far_from_the_mark_it_travels_first_and_near_it_goes_by_sight_at_once(po
 def test_wherever_it_was_left_after_a_suspension_it_goes_on_from_there(before: Position, after: Position) -> None:
     route = pickup_route()
     route.decide(before, 0.0)
-    route.interrupt()
-    assert route.stage is PickupStage.UNKNOWN
+    went_by_sight = route.stage is PickupStage.BY_SIGHT
+    for _ in range(2):
+        route.interrupt()
+        assert route.stage is (PickupStage.LOOK if went_by_sight else PickupStage.UNKNOWN)
+    route.looked(is_seen=False)
     route.decide(after, 100.0)
     assert (route.stage is PickupStage.TRAVEL) == (NEAR.distance_m(after) > AWAY_M)
+
+
+def test_if_the_mark_is_in_sight_after_a_suspension_it_goes_on_by_sight_wherever_that_is() -> None:
+    route = pickup_route()
+    route.decide(Position(2.0, 2.0, 0.0), 0.0)
+    route.interrupt()
+    route.looked(is_seen=True)
+    assert route.stage is PickupStage.BY_SIGHT
 
 
 def test_it_travels_until_it_is_near_and_is_freed_when_it_does_not_get_on() -> None:
@@ -84,6 +96,29 @@ def test_in_the_world_a_robot_that_was_driven_away_meanwhile_returns_to_its_mark
             at = await pose(running, ROBOT)
             assert math.hypot(at.x_m - (0.2 + 0.45), at.y_m - 4.5) < 0.05
             assert abs(abs(at.heading_rad) - math.pi) < math.radians(10.0)
+
+    run_virtual(scene())
+
+
+@pytest.mark.thorough
+def test_in_the_world_a_robot_left_before_its_mark_does_not_go_back_to_where_it_came_by() -> None:
+    """Its place before the mark is 1.15 m from the place to which it goes first."""
+
+    async def scene() -> None:
+        person = Person()
+        async with at_work(example(NAME, near="1.8,4.5"), person) as running:
+            behavior: Any = running.component(NAME)
+            while (await pose(running, ROBOT)).x_m > 0.75:
+                await running.clock.sleep_s(0.1)
+                assert running.clock.now_s() < 60.0, behavior.feedback
+            assert not behavior.status.is_final
+            await person.take_over(ROBOT, driving(0.0, 0.0, 0.3))
+            await wait_until(running, lambda: behavior.robot, 5.0)
+            stages = {PickupStage.LOOK, PickupStage.UNKNOWN}
+            await wait_until(running, lambda: behavior.route.stage not in stages, 5.0)
+            assert behavior.route.stage is PickupStage.BY_SIGHT
+            await wait_until(running, lambda: behavior.status.is_final, 60.0)
+            assert behavior.status is BehaviorStatus.SUCCESS
 
     run_virtual(scene())
 
