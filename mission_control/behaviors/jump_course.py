@@ -99,7 +99,7 @@ class JumpCourse:
         """Number of jumps that the robot obeyed."""
         self._jumped_s = -math.inf
         self._is_seen_landing = False
-        self._watchdog = Watchdog(PATIENCE_S)
+        self._watchdog = Watchdog(PATIENCE_S, speed_m_s)
         self._freeing: Maneuver | None = None
 
     @property

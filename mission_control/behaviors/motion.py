@@ -162,13 +162,14 @@ class Watchdog:
     """Detects a robot that does not get nearer to its goal.
 
     Args:
-        patience_s: Time in which it must get ``STEP_M`` nearer.
+        patience_s: Time in which it must get ``STEP_M`` nearer; longer if it drives slowly.
+        speed_m_s: Speed at which it is driven, above 0.
     """
 
     STEP_M = 0.02  # chosen: half a wheel; tracking from above is more accurate
 
-    def __init__(self, patience_s: float) -> None:
-        self._patience_s = patience_s
+    def __init__(self, patience_s: float, speed_m_s: float = MOST_M_S) -> None:
+        self._patience_s = max(patience_s, 2 * self.STEP_M / speed_m_s)
         self.rest()
 
     def rest(self) -> None:

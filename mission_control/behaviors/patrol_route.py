@@ -69,7 +69,7 @@ class PatrolRoute:
         """Number of times that a stuck robot was shaken free."""
         self._resting_s = 0.0  # remaining rest at the last way point
         self._decided_s: float | None = None
-        self._watchdog = Watchdog(PATIENCE_S)
+        self._watchdog = Watchdog(PATIENCE_S, speed_m_s)
         self._freeing: Maneuver | None = None
 
     @property

@@ -39,7 +39,7 @@ class PickupRoute:
         """How the robot navigates."""
         self.in_vain = 0
         """Number of unsuccessful searches for the mark."""
-        self._watchdog = Watchdog(PATIENCE_S)
+        self._watchdog = Watchdog(PATIENCE_S, speed_m_s)
         self._freeing: Maneuver | None = None
 
     def interrupt(self) -> None:

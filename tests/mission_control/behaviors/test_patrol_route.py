@@ -125,6 +125,13 @@ def test_a_watchdog_bites_only_after_its_patience_without_progress() -> None:
     assert not watchdog.is_stuck(0.55, 100.0)
 
 
+@given(st.floats(0.0005, 0.02))
+def test_a_slow_robot_is_not_stuck(speed_m_s: float) -> None:
+    patrol = PatrolRoute([FloorPoint(0.2, 0.0)], rounds=1, speed_m_s=speed_m_s, reached_within_m=0.08, rest_s=0.0)
+    drive(patrol, Position(0.0, 0.0, 0.0), 0.0, 0.13 / speed_m_s)
+    assert (patrol.is_over, patrol.freed) == (True, 0)
+
+
 @given(st.floats(0.2, 6.0), st.floats(0.1, 30.0))
 def test_a_watchdog_counts_the_time_of_many_short_slices(slice_s: float, pause_s: float) -> None:
     """A robot that has not moved in a pause stays stuck; one that was moved gets all the patience again."""
