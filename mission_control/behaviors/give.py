@@ -5,6 +5,7 @@ In mission.xml: an ARC of any kind that has the command; ``scout-backbone compon
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 
 import msgspec
@@ -76,10 +77,13 @@ class Give(Driver[GiveParameters]):
         self.held_s = 0.0
         """Time for which the command was in force, over all grants."""
         self._values: Mapping[str, object] = read_values(self.parameters.values)
+        self._holding: asyncio.Task[None] | None = None
 
     def parameters_changed(self) -> None:
-        """Send the new command at the next repetition or grant."""
+        """Send the new command now, or at the next grant."""
         self._values = read_values(self.parameters.values)
+        if self._holding is not None:
+            self._holding.cancel()
 
     async def drive_on(self, robot: str) -> None:
         """Send the command, and hold the ARC."""
@@ -88,10 +92,12 @@ class Give(Driver[GiveParameters]):
             await self.held.give(wanted.word, self._values, wanted.role)
             self.report(f"gives {wanted.word}{f' to {robot}' if robot else ''}")
             left_s = max(0.0, wanted.for_s - self.held_s)
-            since_s = self.clock.now_s()
+            since_s, lasts_s = self.clock.now_s(), min(left_s, wanted.again_s or left_s)
+            self._holding = self.start_task(self.clock.sleep_s(lasts_s), "hold")
             try:
-                await self.clock.sleep_s(min(left_s, wanted.again_s or left_s))
+                await asyncio.wait([self._holding])
             finally:
+                self._holding.cancel()
                 self.held_s += self.clock.now_s() - since_s
             if self.held_s >= self.parameters.for_s - TICK_S:
                 self.finish(BehaviorStatus.SUCCESS)

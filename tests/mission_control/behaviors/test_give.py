@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
-from backbone.component.messages import StoryEvent
+from backbone.component.messages import Parameters, SetParameter, StoryEvent
 from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
@@ -115,6 +115,21 @@ def test_an_interruption_costs_none_of_its_time_and_the_command_is_given_again()
             assert said.count("shines green at 50%") == 2
             assert light.held_s == pytest.approx(6.0)
             assert running.clock.now_s() - began_s > 6.0 + 5.0
+
+    run_virtual(main())
+
+
+def test_another_command_and_another_time_hold_at_once() -> None:
+    async def main() -> None:
+        async with at_work(only("light", for_s=3600.0)) as running:
+            said, light = lamp_says(running), running.component("light")
+            await wait_until(running, lambda: "shines green at 50%" in said, 10.0)
+            for parameter, value in (("values", "brightness=0.25"), ("for_s", 1.0)):
+                await running.bus.ask(light.address, SetParameter(parameter, value), Parameters, within_s=1.0)
+                await running.clock.sleep_s(1.0)
+            assert said.count("shines green at 25%") == 1
+            assert isinstance(light, Give)
+            assert light.status is BehaviorStatus.SUCCESS
 
     run_virtual(main())
 
