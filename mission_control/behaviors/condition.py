@@ -133,6 +133,8 @@ class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
         kind = message_class(self.message)
         if not self.field and (self.above, self.below, self.equals) != (None, None, None):
             raise ValueError("field is empty: name the field that is compared")
+        if self.above is not None and self.below is not None and self.above >= self.below:
+            raise ValueError(f"above is {self.above:g} and below is {self.below:g}: no number is between them")
         if kind in ASKED_FOR and (self.source == ANY or _asked_at(kind, self.source) is None):
             asked = "behavior whose report is" if kind is BehaviorState else "RC whose readings are"
             raise ValueError(f"source is {self.source}: name the {asked} asked for")

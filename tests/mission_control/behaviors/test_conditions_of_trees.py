@@ -126,6 +126,7 @@ def test_a_comparison_reads_one_field(comparison: Comparison, holds: bool) -> No
         ({"message": "MotionSeen", "above": 3.0}, "field is empty"),
         ({"message": "MotionSeen", "source": "Watch 1"}, "component's name or address"),
         ({"message": "BehaviorState"}, "name the behavior"),
+        ({"message": "MotionSeen", "field": "at_s", "above": 3.0, "below": 3.0}, "no number is between them"),
     ],
 )
 def test_a_condition_that_cannot_be_is_refused(parameters: dict[str, Any], complaint: str) -> None:
