@@ -82,8 +82,10 @@ class ReturnToPickup(Servo[PickupParameters]):
         super().interrupted()
 
     def parameters_changed(self) -> None:
-        """Begin again with the new parameters."""
-        self.route = self._way()
+        """Begin again with the new parameters; by sight if the mark is in sight."""
+        before, self.route = self.route, self._way()
+        if before.stage in (PickupStage.BY_SIGHT, PickupStage.LOOK):
+            self.route.stage = PickupStage.LOOK  # ``drive_on`` may be waiting for a picture
         super().parameters_changed()
 
     def statistics(self) -> dict[str, float]:

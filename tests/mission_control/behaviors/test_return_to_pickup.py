@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
+from backbone.component.messages import Parameters, SetParameter
 from mission_control.behaviors.motion import FloorPoint, Motion, Position
 from mission_control.behaviors.pickup_route import AWAY_M, NEAR_M, PickupRoute, PickupStage
 from mission_control.behaviors.return_to_pickup import PickupParameters, ReturnToPickup
@@ -96,6 +97,21 @@ def test_in_the_world_a_robot_that_was_driven_away_meanwhile_returns_to_its_mark
             at = await pose(running, ROBOT)
             assert math.hypot(at.x_m - (0.2 + 0.45), at.y_m - 4.5) < 0.05
             assert abs(abs(at.heading_rad) - math.pi) < math.radians(10.0)
+
+    run_virtual(scene())
+
+
+def test_in_the_world_another_place_or_distance_while_it_goes_by_sight_does_not_stop_it() -> None:
+    async def scene() -> None:
+        async with at_work(example(NAME)) as running:
+            behavior: Any = running.component(NAME)
+            await wait_until(running, lambda: behavior.route.stage is PickupStage.BY_SIGHT, 30.0)
+            for parameter, value in (("near", "2,4.5"), ("stop_m", 0.6)):
+                await running.bus.ask(behavior.address, SetParameter(parameter, value), Parameters, within_s=1.0)
+                await running.clock.sleep_s(1.0)
+            await wait_until(running, lambda: behavior.status.is_final, 90.0)
+            assert behavior.status is BehaviorStatus.SUCCESS
+            assert behavior.payload["ahead_m"] == pytest.approx(0.6, abs=0.05)
 
     run_virtual(scene())
 
