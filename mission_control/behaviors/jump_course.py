@@ -111,6 +111,10 @@ class JumpCourse:
         """Return the time for which the robot must still get no command, 0: none."""
         return max(0.0, self._jumped_s + LANDED_AFTER_S - now_s)
 
+    def lands_in(self, airborne_s: float, now_s: float) -> None:
+        """Give no command for this time, because the robot still jumps."""
+        self._jumped_s = now_s + airborne_s - LANDED_AFTER_S
+
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision depends only on its position then."""
         self._freeing, self._is_seen_landing = None, False

@@ -96,8 +96,9 @@ class JumpOver(Driver[JumpOverParameters]):
         self.report(f"suspended: {suspended_because(reason, by)}; {self.course.jumps} jumps until now")
 
     def parameters_changed(self) -> None:
-        """Begin again with the new parameters."""
-        self.course = self._plan()
+        """Begin again with the new parameters, after a present jump."""
+        airborne_s, self.course = self.not_now(), self._plan()
+        self.course.lands_in(airborne_s, self.clock.now_s())
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters and the jumps."""

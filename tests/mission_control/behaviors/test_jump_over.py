@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
+from backbone.component.messages import Parameters, SetParameter
+from backbone.keys import Conversation
 from mission_control.behaviors.jump_course import (
     BEYOND_M,
     LANDED_AFTER_S,
@@ -22,6 +24,7 @@ from mission_control.behaviors.jump_course import (
 from mission_control.behaviors.jump_over import JumpOver, JumpOverParameters
 from mission_control.behaviors.motion import FloorPoint, Motion, Position, turned
 from mission_control.messages import BehaviorStatus
+from resource_pool.messages import Applied
 
 STEP_S = 0.1
 NAME, ROBOT = "jump-scout2", "scout2"
@@ -168,6 +171,24 @@ def test_in_the_world_a_scout_jumps_over_a_box_of_thirty_centimeters_and_drives_
             assert behavior.payload == {"jumps": 1}
             at = await pose(running, ROBOT)
             assert at.x_m > 5.0 + 0.1 + BEYOND_M
+
+    run_virtual(scene())
+
+
+def test_in_the_world_a_new_parameter_amid_a_jump_disturbs_no_jump() -> None:
+    async def scene() -> None:
+        async with at_work(example(NAME)) as running:
+            behavior, told = running.component(NAME), list[str]()
+            assert isinstance(behavior, JumpOver)
+            at = f"resource_pool/{ROBOT}"
+            running.bus.subscribe(at, Conversation.MOTIONS, Applied, lambda heard: told.append(heard.body.command))
+            await wait_until(running, lambda: "jump" in told, 60.0)
+            told.clear()
+            await running.bus.ask(behavior.address, SetParameter("onward_m", 0.3), Parameters, within_s=1.0)
+            await running.clock.sleep_s(2.5)
+            assert told == []
+            await wait_until(running, lambda: behavior.status.is_final, 60.0)
+            assert behavior.status is BehaviorStatus.SUCCESS, behavior.payload
 
     run_virtual(scene())
 
