@@ -215,8 +215,11 @@ def parse(data: bytes, report: Report) -> Element | None:
     lines = _Lines(data)
     try:
         data.decode()
+        wrong = data.find(0)  # in UTF-16 without a mark, which expat would read as such
     except UnicodeDecodeError as error:
-        report.fault(lines.place(error.start), f"byte 0x{data[error.start]:02x} is no UTF-8", "Save the file in UTF-8.")
+        wrong = error.start
+    if wrong >= 0:
+        report.fault(lines.place(wrong), f"byte 0x{data[wrong]:02x} is no UTF-8 text", "Save the file in UTF-8.")
         return None
     return _Parse(data, lines, report).root()
 

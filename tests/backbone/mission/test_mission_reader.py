@@ -105,6 +105,12 @@ def test_other_encodings_are_refused(tmp_path: Path, encoding: str) -> None:
     assert "UTF-8" in fault.remedy
 
 
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_utf_16_without_mark_and_declaration_is_refused(tmp_path: Path, encoding: str) -> None:
+    [fault] = faults_in(tmp_path, '<mission name="small" priority="1"/>'.encode(encoding))
+    assert (fault.line, fault.remedy) == (1, "Save the file in UTF-8")
+
+
 def test_a_byte_order_mark_is_no_fault(tmp_path: Path) -> None:
     assert read_text(tmp_path, b"\xef\xbb\xbf" + SMALL.read_bytes()).name == "small"
 

@@ -107,6 +107,7 @@ def test_a_room_of_ones_own_travels_with_the_mission(tmp_path: Path) -> None:
         ("<!DOCTYPE mujoco><mujoco/>", "document type declaration"),
         ("<mujoco/>" + " " * MAX_BYTES, "is larger than"),
         ("\udcff", "no UTF-8"),
+        ("<\0m\0u\0j\0o\0c\0o\0 \0a\0=\0'\0'\0/\0>\0", "no UTF-8"),
     ],
 )
 def test_a_room_file_that_cannot_be_used_is_refused_with_a_remedy(tmp_path: Path, content: str, told: str) -> None:
