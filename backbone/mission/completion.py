@@ -25,6 +25,8 @@ def complete(root: Element) -> None:
         if shipped.text("name") not in declared:
             for element in shipped:
                 element.place = root.place
+                for attribute in element.attributes.values():
+                    attribute.place = root.place
             types.children.append(shipped)
 
 

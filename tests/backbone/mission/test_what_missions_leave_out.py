@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from mission_files import HERE, MISSION_XML, SMALLEST, read_text
+from mission_files import HERE, MISSION_XML, SMALLEST, faults_in, read_text
 
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.reader import read_mission
@@ -40,6 +40,12 @@ def test_a_type_takes_the_place_of_the_shipped_one_of_its_name(tmp_path: Path) -
     mission = read_text(tmp_path, f'<mission name="m" priority="1"><types>{own}</types></mission>')
     [drive] = [kind for kind in mission.types if kind.name == "drive"]
     assert (drive.class_path, drive.needs, drive.restart) == ("backbone.component.component:Component", {}, True)
+
+
+def test_a_fault_of_a_shipped_type_stands_at_the_begin_of_the_mission(tmp_path: Path) -> None:
+    own = '<type name="scout" class="backbone.component.component:Component" subsystem="mission_control"/>'
+    faults = faults_in(tmp_path, f'\n<mission name="m" priority="1"><types>{own}</types></mission>')
+    assert {(fault.line, fault.column) for fault in faults} == {(2, 1)}
 
 
 def test_every_host_runs_a_creator_and_the_first_the_other_services(tmp_path: Path) -> None:
