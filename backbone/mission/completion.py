@@ -36,7 +36,7 @@ def _complete_core(root: Element, core: Element, hosts: list[str]) -> None:
     there = {(service.text("type"), service.text("host")) for service in core.children}
     for name in CORE_SERVICES:
         if name == CREATOR:
-            missing = [host for host in hosts if (name, host) not in there]
+            missing = [host for host in dict.fromkeys(hosts) if (name, host) not in there]
         else:
             missing = [] if any(known == name for known, _host in there) else hosts[:1]
         core.children += [_element(root, "service", {"type": name, "host": host}) for host in missing]

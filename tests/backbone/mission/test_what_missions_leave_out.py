@@ -58,6 +58,12 @@ def test_every_host_runs_a_creator_and_the_first_the_other_services(tmp_path: Pa
     assert mission.core_parameters("rc_manager") == {"grid_s": 4}
 
 
+def test_a_host_that_stands_twice_is_one_fault(tmp_path: Path) -> None:
+    hosts = '<host name="one" address="127.0.0.1"/><host name="one" address="127.0.0.2"/>'
+    [fault] = faults_in(tmp_path, f'<mission name="m" priority="1"><hosts>{hosts}</hosts></mission>')
+    assert fault.message == "a second host 'one'; the first is in line 1"
+
+
 def test_the_shipped_missions_say_only_what_is_their_own() -> None:
     assert len(MISSION_XML.read_text().splitlines()) <= 75
     assert len(SMALLEST.read_text().splitlines()) <= 15
