@@ -131,7 +131,7 @@ Facts = Annotated[dict[Mention, Text | Whole | Measure | bool], FEW]
 # ---------------------------------------------------------------------- values of any kind
 Values = Annotated[dict[Mention, Any], MANY]
 """Named values of any kind, as in a mission file; ``wildness`` finds illegal values."""
-DEEPEST = 24  # chosen: the description of a world is six deep
+DEEPEST = 72  # chosen: a behavior tree is two deep for each of the 32 levels of a mission file; and room around it
 
 
 def wildness(value: object, depth: int = 0) -> str:

@@ -7,7 +7,9 @@ import msgspec
 import pytest
 
 from backbone.mission.behavior_orders import ReservedParameter, behavior_order, behavior_orders
+from backbone.mission.document import MAX_DEPTH
 from backbone.mission.model import ArcWish, BehaviorDescription, MissionDescription
+from backbone.ranges import wildness
 
 WATCH = BehaviorDescription(
     type="watch_for_motion",
@@ -76,3 +78,11 @@ def test_a_parameter_of_a_reserved_name_is_refused_at_any_depth() -> None:
 def test_ordering_a_child_needs_no_pydantic() -> None:
     check = "import sys, backbone.mission.behavior_orders; sys.exit('pydantic' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0
+
+
+def test_a_tree_as_deep_as_a_mission_file_can_be_fits_into_a_message() -> None:
+    branch = WATCH
+    for level in range(MAX_DEPTH - len(("mission", "behaviors", "behavior", "arc", "wish"))):
+        branch = BehaviorDescription(type="sequence", name=f"above{level}", priority=1, children=(branch,))
+    [order] = behavior_orders(mission(branch))
+    assert wildness(order) == ""
