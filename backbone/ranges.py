@@ -42,7 +42,7 @@ LONGEST_MENTION = 255  # chosen: four names and their separators; the longest fi
 LONGEST_SOURCE = LONGEST_MENTION - 18  # leaves room for ``#<sequence>``
 LONGEST_LINE = 4_096  # chosen: far more than a person reads in one line
 LONGEST_TEXT = 262_144  # chosen: the names of 10 000 ARCs in one sentence
-LONGEST_DOCUMENT = 524_288  # chosen: the XML of a room with a thousand objects
+LONGEST_DOCUMENT = 4_194_304  # chosen: half a message; the XML of 254 Scouts, 6 KB each, in the largest room
 
 Name = Annotated[str, Meta(max_length=MAX_NAME_LENGTH, pattern=r"^[a-z][a-z0-9_-]*\Z")]
 """A legal name, see ``naming``."""

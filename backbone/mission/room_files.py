@@ -14,7 +14,7 @@ from backbone.mission.report import Report, quoted
 from backbone.mission.tables import FLOOR_PLAN
 
 MAX_BYTES = 1024 * 1024  # chosen: as a mission file's; a room of ten thousand boxes fits
-MAX_PLAN_BYTES = 384 * 1024  # in base64 512 KiB, the longest value of a parameter
+MAX_PLAN_BYTES = 384 * 1024  # chosen: in base64 512 KiB, a tenth of the longest value of a parameter
 PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
 """First bytes of PNG and JPEG files."""
 

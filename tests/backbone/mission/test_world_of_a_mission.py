@@ -6,9 +6,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from backbone.mission import world_checks
+from backbone.mission import document, world_checks
 from backbone.mission.reader import MissionInvalid, read_mission
 from backbone.mission.room_files import MAX_BYTES
+from backbone.ranges import LONGEST_DOCUMENT, wildness
 from scout_model import dimensions
 from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, WorldDescription
 from scout_model.world import World
@@ -115,6 +116,12 @@ def test_a_room_file_that_cannot_be_used_is_refused_with_a_remedy(tmp_path: Path
     message = refusal(tmp_path, with_content("", 'mjcf="hall.xml"'))
     assert told in message
     assert message.endswith(")")
+
+
+def test_the_largest_room_and_the_largest_mission_file_fit_into_a_message(tmp_path: Path) -> None:
+    (tmp_path / "hall.xml").write_text(HALL + " " * (MAX_BYTES - len(HALL)))
+    assert wildness(world_of(tmp_path, with_content("", 'mjcf="hall.xml"')).mjcf) == ""
+    assert document.MAX_BYTES <= LONGEST_DOCUMENT
 
 
 def test_a_folder_is_no_room(tmp_path: Path) -> None:
