@@ -154,7 +154,8 @@ def parameters_of(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
 def _simple(one: ValueSchema, definitions: ValueSchema) -> ValueSchema:
     """Return the part of a schema that fits values in a mission file: no objects, no lists."""
     if "$ref" in one:
-        return _simple(definitions[one["$ref"]], definitions)
+        beside = {key: value for key, value in one.items() if key != "$ref"}  # such as the default
+        return _simple({**definitions[one["$ref"]], **beside}, definitions)
     kept = {key: one[key] for key in ("type", "enum", "default", *_META) if key in one}
     if "anyOf" in one:
         kept["anyOf"] = [_simple(each, definitions) for each in one["anyOf"]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from enum import Enum
 from pathlib import Path
 
 import msgspec
@@ -240,6 +241,25 @@ def test_facts_of_a_type_name_what_it_takes_for_people() -> None:
     assert [one.legal_values for one in parameters_of(Kinds)] == ["integer or null", "array", "true or false"]
     assert [one.summary for one in parameters_of(Kinds)][2] == "boolean, default true"
     assert [one.accepts(None) for one in parameters_of(Kinds)] == [True, False, False]
+
+
+class Color(Enum):
+    RED = "red"
+    BLUE = "blue"
+
+
+class Box(msgspec.Struct, frozen=True):
+    width_m: float = 1.0
+
+
+def test_a_word_of_an_enumeration_and_a_struct_may_be_defaults() -> None:
+    class Kinds(msgspec.Struct):
+        asked: Color
+        color: Color = Color.RED
+        box: Box = Box()
+
+    assert [one.is_required for one in parameters_of(Kinds)] == [True, False, False]
+    assert parameters_of(Kinds)[1].summary == 'one of blue, red, default "red"'
 
 
 def test_the_reference_of_behaviors_has_the_parameters_of_their_classes_with_their_defaults() -> None:
