@@ -16,6 +16,7 @@ from backbone.component.field_docs import field_docs
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
 
+BY_CLASS_ALONE = ("multipleOf", "format", "contentEncoding")  # rules of a schema that ``ParameterFacts`` lacks
 ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; a hang or kill of their process ends no more
 
 
@@ -41,7 +42,7 @@ def _described(found: type[Component[Any]]) -> ClassFacts:
         inspect.getdoc(found) or "",
         own,
         None if options is None else {driver: _documented(struct) for driver, struct in options.items()},
-        hasattr(found.parameters_type, "__post_init__"),
+        _has_rules(found.parameters_type),
         children=getattr(found, "children_allowed", None),
         may_claim=getattr(found, "may_claim", True),
         abilities=found.abilities(),
@@ -49,6 +50,12 @@ def _described(found: type[Component[Any]]) -> ClassFacts:
         shares_process=found.shares_process,
         alike_most=max(1, found.alike_most or (ALIKE_MOST if found.shares_process else 1)),
     )
+
+
+def _has_rules(struct: type[msgspec.Struct]) -> bool:
+    """Return whether only the class can judge its values; a word too many here costs one question."""
+    declared = msgspec.json.encode(msgspec.json.schema(struct)).decode()
+    return hasattr(struct, "__post_init__") or any(f'"{word}":' in declared for word in BY_CLASS_ALONE)
 
 
 def _documented(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:

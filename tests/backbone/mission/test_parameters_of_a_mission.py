@@ -99,6 +99,21 @@ def test_a_class_that_cannot_be_imported_is_a_fault_at_its_type(
     assert "veiw_s" in at_parameter.message
 
 
+@pytest.mark.parametrize(
+    ("declared", "legal", "illegal"),
+    [("Annotated[int, msgspec.Meta(multiple_of=5)] = 5", "10", "7"), ("date | None = None", "2026-11-27", "today")],
+)
+def test_a_value_that_only_the_class_can_judge_is_judged_by_it(
+    modules: Path, declared: str, legal: str, illegal: str
+) -> None:
+    imports = "from datetime import date\nfrom typing import Annotated\n"
+    module = f"own_{len(declared)}"
+    (modules / f"{module}.py").write_text(imports + GOOD.replace("float = 1.0", declared))
+    assert not faults_in(modules, with_own_type(f"{module}:Own", depth_m=legal))
+    [fault] = faults_in(modules, with_own_type(f"{module}:Own", depth_m=illegal))
+    assert "own mine refuses its parameters" in fault.message
+
+
 def test_a_class_that_ends_its_process_when_it_judges_holds_nothing_up(modules: Path) -> None:
     rule = "    def __post_init__(self):\n        import os\n        os._exit(1)\n\nclass Own"
     (modules / "own_judge.py").write_text(GOOD.replace("\nclass Own", rule))
