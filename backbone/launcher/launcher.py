@@ -43,6 +43,7 @@ from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
+from backbone.run_files import RunFolderRemoved, wait_removed
 from backbone.waiting import first_of
 from backbone.wire import Accepts, Envelope, Message
 
@@ -117,7 +118,9 @@ class Launcher(Component[NoParameters]):
             self._recorder.on_changed = self._recorder_changed
             self.start_task(self._recorder.keep(), "recorder")
         if self.launch.run_directory:
-            self.start_task(NamesKeeper(self.bus, self.clock, Path(self.launch.run_directory)).run(), "names")
+            folder = Path(self.launch.run_directory)
+            self.start_task(NamesKeeper(self.bus, self.clock, folder).run(), "names")
+            self.start_task(self._end_without(folder), "run folder")
         try:
             await self._start_mission()
         except BackboneError as error:
@@ -152,6 +155,14 @@ class Launcher(Component[NoParameters]):
     async def _end_after(self, mission_s: float) -> None:
         await self.clock.sleep_s(mission_s)
         self.end(f"ran for {mission_s:g} s")
+
+    async def _end_without(self, folder: Path) -> None:
+        """End at once if the run folder is removed: no command finds the mission then, and no component can join."""
+        await wait_removed(folder, self.clock)
+        error = self.outcome.failure = RunFolderRemoved(f"{folder} was removed", directory=str(folder))
+        self._observer.announce(f"{error}; the mission ends")
+        self.publish_event(self._description.name, f"ends: {error}", LogLevel.ALARM)
+        self.end(str(error), at_once=True)
 
     def end(self, reason: str, *, at_once: bool = False) -> None:
         """Run the last branch, then end. Without a branch, at a second order, or if ``at_once``, end now."""

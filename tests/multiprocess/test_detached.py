@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from running_mission import MARK, MISSION_XML, marked, wait_gone
+from running_mission import MARK, MISSION_XML, marked, mission_up, wait_gone
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
@@ -139,3 +140,12 @@ def launcher(up: subprocess.Popen[str], mark: str) -> psutil.Process:
             if process.ppid() == up.pid:
                 return process
     raise AssertionError("no launcher")
+
+
+def test_a_mission_that_nobody_can_find_any_more_ends() -> None:
+    with mission_up(mission_xml=SMALLEST) as mission:
+        shutil.rmtree(mission.directory)
+        assert mission.launcher.wait(20) == 6, mission.story()
+        mission.wait_for_line("the mission failed: .*was removed", 5.0)
+        assert wait_gone(mission.environment[MARK], 3.0) == []
+        assert not mission.directory.exists()
