@@ -90,7 +90,7 @@ class KeptCreator:
         await _wait_free(bus, clock, creator_name(self._launch.host))
         answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
         types = [counted.component_type for counted in answered.types]
-        directory = prepared_folder(self._offered)
+        self._directory = directory = prepared_folder(self._offered)
         self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))
         self._keeper = ProcessKeeper(self._zygote, clock)
         self._keeper.on_fell = self.on_fell
@@ -105,6 +105,10 @@ class KeptCreator:
     def absences(self) -> list[Absence]:
         """Return the creator as absent while it does not run or respond."""
         return self._keeper.absences() if self._keeper is not None else []
+
+    async def wait_folder_removed(self, clock: Clock) -> None:
+        """Return when the folder of the started creator is no longer there."""
+        await run_files.wait_removed(self._directory, clock)
 
     async def close(self) -> None:
         """End the creator and all its components. Idempotent."""

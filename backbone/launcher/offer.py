@@ -2,6 +2,7 @@
 
 The offer outlives the link. If the link to the hub is down for ``CUT_OFF_S``, the offer ends its creator and all
 components of that creator. It then reconnects to the hub, reads the mission's clock again, and starts a new creator.
+It does the same if this machine's folder is removed.
 The offer ends when the mission's launcher asks it to (``down``), or on a signal.
 """
 
@@ -55,6 +56,7 @@ class Ending(StrEnum):
     ORDERED = "ordered to end"
     CUT_OFF = "the link to the mission was lost"
     REPLACED = "the mission has another machine of this name"
+    NO_FOLDER = "the folder of this machine's files was removed"
     OTHER_TIME = "the mission's time is no longer the one known here, as after a sleep of this machine"
 
 
@@ -94,6 +96,7 @@ class MachineOffer(Component[NoParameters]):
 
     async def serve(self) -> None:
         """Report that the machine is in the mission."""
+        self.start_task(self._watch_folder(), "run folder")
         self._on_ready()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -134,6 +137,11 @@ class MachineOffer(Component[NoParameters]):
             if await self._is_replaced():
                 self._end_as(Ending.REPLACED)
                 return
+
+    async def _watch_folder(self) -> None:
+        """End this offer if the folder is removed, because without its secret no component can start here."""
+        await self._creator.wait_folder_removed(self.clock)
+        self._end_as(Ending.NO_FOLDER)
 
     def _link_changed(self, is_up: bool) -> None:
         if is_up:

@@ -62,6 +62,7 @@ class FakeCreator:
     missing: list[Absence] = field(default_factory=list)
     on_changed: Callable[[], None] = lambda: None
     began: asyncio.Event = field(default_factory=asyncio.Event)
+    folder_removed: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def start(self, bus: Bus, clock: Clock) -> None:
         self.began.set()
@@ -76,6 +77,9 @@ class FakeCreator:
 
     def absences(self) -> list[Absence]:
         return self.missing
+
+    async def wait_folder_removed(self, clock: Clock) -> None:
+        await self.folder_removed.wait()
 
     async def close(self) -> None:
         self.runs = False
@@ -169,6 +173,13 @@ async def test_a_machine_whose_name_was_given_away_while_it_was_cut_off_ends_wha
         scene.bus.link_changed(True)
         assert await scene.ends() is Ending.REPLACED
         assert not scene.creator.runs
+
+
+async def test_a_folder_that_is_removed_ends_what_runs_here(on_a_cable: Callable[..., Any]) -> None:
+    async with on_a_cable() as scene:
+        scene.creator.folder_removed.set()
+        assert await scene.ends() is Ending.NO_FOLDER
+        assert scene.creator.log == ["started", "closed"]
 
 
 async def test_a_link_that_is_lost_before_the_creator_is_ready_ends_the_wait(on_a_cable: Callable[..., Any]) -> None:
