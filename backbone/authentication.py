@@ -18,6 +18,7 @@ from backbone.errors import Refusal
 SOCKET_NAME, SECRET_NAME = "hub.sock", "secret"
 SOCKET = "unixsock-stream/"
 """Prefix of an endpoint that is a unix socket, so its links cannot leave the host."""
+ENDS_OF_PATH = "?#"  # begin the metadata and the configuration of a Zenoh endpoint
 LONGEST_SOCKET_PATH = 107  # linux/un.h: sun_path has 108 bytes, of which the last one is 0
 HUB_PORT = 7447  # Zenoh's own
 USER = "scout"  # the one user of today's hubs; certificates will name hosts and people
@@ -32,6 +33,13 @@ class SocketPathTooLong(Refusal):
     remedy = "Give the mission a shorter name, or set XDG_RUNTIME_DIR to a folder with a shorter path."
 
 
+class SocketPathCut(Refusal):
+    """The path has a character that ends the path of an endpoint."""
+
+    code = "run.socket_path_cut"
+    remedy = "Set XDG_RUNTIME_DIR to a folder whose path has no '?' and no '#'."
+
+
 class NoSecret(Refusal):
     """The secret of a mission with several machines is missing or unreadable."""
 
@@ -44,8 +52,11 @@ def socket_endpoint(directory: Path) -> str:
 
     Raises:
         SocketPathTooLong: The path is too long for a socket.
+        SocketPathCut: Zenoh would use only a part of the path.
     """
     path = directory.absolute() / SOCKET_NAME
+    if cut := next((each for each in str(path) if each in ENDS_OF_PATH), None):
+        raise SocketPathCut(f"Zenoh reads the path {path} only up to {cut!r}", path=str(path))
     length = len(os.fsencode(path))
     if length > LONGEST_SOCKET_PATH:
         raise SocketPathTooLong(

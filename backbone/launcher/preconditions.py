@@ -69,6 +69,7 @@ def prepare_endpoint(description: MissionDescription, directory: Path) -> str:
 
     Raises:
         SocketPathTooLong: The folder's path is too long for a socket.
+        SocketPathCut: The folder's path has a character that ends the path of an endpoint.
         PortTaken: The hub cannot listen for the other machines.
     """
     endpoint = socket_endpoint(directory)

@@ -13,6 +13,7 @@ from backbone.authentication import (
     LONGEST_SOCKET_PATH,
     SOCKET_NAME,
     NoSecret,
+    SocketPathCut,
     SocketPathTooLong,
     dictionary_of,
     keep_secret,
@@ -51,6 +52,12 @@ def test_the_longest_socket_path_is_the_systems_and_one_byte_more_is_refused(sho
         socket_endpoint(longer)
     with socket.socket(socket.AF_UNIX) as listening, pytest.raises(OSError, match="too long"):
         listening.bind(str(longer / SOCKET_NAME))
+
+
+@pytest.mark.parametrize("name", ["a?b", "a#b"])
+def test_a_socket_path_that_zenoh_would_cut_is_refused(name: str) -> None:
+    with pytest.raises(SocketPathCut, match="XDG_RUNTIME_DIR"):
+        socket_endpoint(Path("/run") / name)
 
 
 def test_the_secret_lies_in_a_file_that_others_cannot_read(tmp_path: Path) -> None:
