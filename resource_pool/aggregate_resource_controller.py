@@ -42,10 +42,11 @@ from backbone.rc_manager.messages import (
     Withdraw,
 )
 from backbone.scheduling.requests import Usage
+from backbone.scheduling.run_times import require_runtime
 from backbone.waiting import set_within
 from backbone.wire import Accepts, Envelope, Message, kinds_of
 from resource_pool.arc_commands import ArcCommands
-from resource_pool.arc_request import ROBOT, ArcParameters, request_of, require_runtime
+from resource_pool.arc_request import ROBOT, ArcParameters, request_of
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
 from resource_pool.commands import Command
 from resource_pool.gate import Gate
@@ -241,8 +242,7 @@ class AggregateResourceController(Component[ArcParameters]):
             MissingRuntime: No slice can be planned with these run times.
         """
         before, now = self._in_force, self.parameters
-        fixed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)} - RUN_TIMES
-        if fixed:
+        if fixed := {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)} - RUN_TIMES:
             raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed))} while it runs")
         require_runtime(self.name, now.minimum_runtime_s, now.maximum_runtime_s)
         self._in_force = now

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
 import msgspec
 
 from backbone.scheduling.claims import scheduling_request
-from backbone.scheduling.requests import MissingRuntime, PathNode, SchedulingRequest, Usage
+from backbone.scheduling.requests import PathNode, SchedulingRequest, Usage
 from resource_pool.messages import DEFAULT_DRIVE_USAGE, NotMySet
 
 ROBOT = "robot"
@@ -142,13 +141,3 @@ def set_of(arc: str, sets: Sequence[dict[str, str]], rcs: Iterable[str]) -> dict
     if not found:
         raise NotMySet(f"{arc} asked for no such set: {', '.join(sorted(wanted)) or 'nothing'}")
     return found[0]
-
-
-def require_runtime(arc: str, least_s: float, most_s: float) -> None:
-    """Reject run times that no slice can have, because a restarted RC manager would reject the whole request.
-
-    Raises:
-        MissingRuntime: No slice can have these run times.
-    """
-    if not (0 < least_s < math.inf and (most_s == 0 or least_s <= most_s < math.inf)):
-        raise MissingRuntime(f"{arc} asks for at least {least_s:g} s and at most {most_s:g} s", arc=arc)

@@ -14,8 +14,9 @@ from backbone.component.asking import ask_until_answered
 from backbone.errors import LinkError, Refusal
 from backbone.rc_manager.messages import ChangeRuntime, CurrentRequest, Done, SetIdle, Withdraw
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.scheduling.run_times import require_runtime
 from backbone.wire import Message
-from resource_pool.arc_request import require_runtime, set_of
+from resource_pool.arc_request import set_of
 from resource_pool.arc_slice import RC_REPLY_S
 
 log = logging.getLogger(__name__)

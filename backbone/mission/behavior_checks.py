@@ -11,7 +11,7 @@ from backbone.mission.reading_checks import check_readings, check_vision
 from backbone.mission.report import Report, listed
 from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
-from backbone.scheduling.alternatives import SHORTEST_RUNTIME_S
+from backbone.scheduling.run_times import SHORTEST_RUNTIME_S
 from backbone.spoken import counted
 
 TRIES_AT_MOST = 100_000  # chosen: a third of a second; a set that fits is found in the first few tries

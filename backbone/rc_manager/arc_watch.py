@@ -30,9 +30,9 @@ from backbone.rc_manager.messages import (
     Withdraw,
 )
 from backbone.rc_manager.recovery import Recovery
-from backbone.scheduling.alternatives import can_be_planned
 from backbone.scheduling.events import Departed, Event
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest
+from backbone.scheduling.run_times import can_be_planned
 from backbone.scheduling.views import RequestAttributes
 from backbone.wire import Envelope, Message
 

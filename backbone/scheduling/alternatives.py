@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from backbone.ranges import A_DAY_S, MOST_STREAMS
+from backbone.ranges import MOST_STREAMS
 from backbone.scheduling.entries import CONNECTED
 from backbone.scheduling.requests import (
     CapacityExceeded,
-    MissingRuntime,
     RcUse,
     SchedulingRefusal,
     SchedulingRequest,
@@ -22,12 +21,11 @@ from backbone.scheduling.requests import (
     Usage,
 )
 from backbone.scheduling.response_time import admissible, remedy
+from backbone.scheduling.run_times import require_runtime
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.streams import stream, utilization
 
 Wish = Mapping[str, RcUse]
-
-SHORTEST_RUNTIME_S = 0.001  # chosen: less than any context switch takes; shorter slices only waste the RCs' time
 
 
 def choose(state: ScheduleState, request: SchedulingRequest) -> tuple[str, ...]:
@@ -103,15 +101,8 @@ def _share(streams: Sequence[Usage]) -> float:
     return utilization([stream(usage) for usage in streams])
 
 
-def can_be_planned(least_s: float, most_s: float) -> bool:
-    """Return whether slices of these times can be planned."""
-    return SHORTEST_RUNTIME_S <= least_s <= most_s <= A_DAY_S
-
-
 def _check_form(request: SchedulingRequest) -> None:
-    least_s, most_s = request.minimum_runtime_s, request.maximum_runtime_s
-    if not (can_be_planned(least_s, least_s) and (most_s == 0 or can_be_planned(least_s, most_s))):
-        raise MissingRuntime(f"{request.arc} asks for at least {least_s:g} s and at most {most_s:g} s", arc=request.arc)
+    require_runtime(request.arc, request.minimum_runtime_s, request.maximum_runtime_s)
     if not request.alternatives or not all(request.alternatives):
         raise SchedulingRefusal(f"{request.arc} asks for no RC", arc=request.arc)
     for wish in request.alternatives:

@@ -17,7 +17,6 @@ from collections.abc import Sequence
 
 import msgspec
 
-from backbone.scheduling.alternatives import can_be_planned
 from backbone.scheduling.damping import Damping
 from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry, OpenDecision
 from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
@@ -28,6 +27,7 @@ from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import MeasuredPackets, RcUse, RequestState, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.run_times import can_be_planned
 from backbone.scheduling.transitions import Transitions, because
 
 _NO_USE = RcUse()

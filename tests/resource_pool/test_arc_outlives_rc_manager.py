@@ -161,7 +161,7 @@ def test_run_times_that_were_changed_are_those_the_next_rc_manager_hears(local_m
     run_virtual(main())
 
 
-@pytest.mark.parametrize("least_s", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("least_s", [0.0, -1.0, 1e-4, float("nan"), float("inf")])
 def test_run_times_no_slice_can_be_planned_for_are_refused_and_change_nothing(
     local_mission: Any, least_s: float
 ) -> None:
