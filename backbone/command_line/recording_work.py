@@ -103,7 +103,7 @@ async def record_to(
         else:
             mission_xml, classes = await _mission_file(bus), await mission_classes(bus)
         folder = told.host_folder or (None if told.is_lossless else _folder_by_hand(where, bus.mission, keys))
-        with _new_files(path, splitting.keep) as files:
+        with new_files(path, splitting.keep) as files:
             recorder = Recorder(
                 bus,
                 clock,
@@ -200,9 +200,19 @@ async def _about(bus: Bus, clock: MissionClock, keys: list[str]) -> dict[str, st
 
 
 @contextmanager
-def _new_files(path: Path, keep: int) -> Iterator[RecordingFiles]:
+def new_files(path: Path, keep: int) -> Iterator[RecordingFiles]:
+    """Make the first file of a recording, and close its files at the end.
+
+    Raises:
+        FileUnusable: The file exists, cannot be written, or has a path that no message can contain.
+    """
     try:
+        str(path.absolute()).encode()  # beats name the file
         files = RecordingFiles(path, keep)
+    except UnicodeEncodeError as error:
+        raise FileUnusable(
+            f"the path {str(path.absolute())!r} has a byte that is no UTF-8", remedy="Name a file whose path is UTF-8."
+        ) from error
     except FileExistsError as error:
         raise FileUnusable(f"{path} exists", remedy="Name a new file.") from error
     except OSError as error:
