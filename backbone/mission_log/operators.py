@@ -9,7 +9,8 @@ from enum import StrEnum
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
-from backbone.ranges import Instant, Mention, Text
+from backbone.printable_text import printable
+from backbone.ranges import LONGEST_MENTION, Instant, Mention, Text
 from backbone.wire import Message
 
 
@@ -119,9 +120,9 @@ class OperatorActed(Message, frozen=True):
 
 
 def login_name() -> str:
-    """Return the name of the logged-in user, if the system knows it."""
+    """Return the name of the logged-in user, if the system knows it, as a text that every message can contain."""
     try:
-        return getpass.getuser()
+        return printable(getpass.getuser())[:LONGEST_MENTION]
     except (OSError, KeyError):  # the user has no name, as in a container
         return f"uid-{os.getuid()}"
 

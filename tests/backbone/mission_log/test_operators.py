@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+
+import msgspec
 import pytest
 
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -15,6 +18,13 @@ def test_every_action_has_a_sentence_that_names_the_user(action: OperatorAction)
     plain = OperatorActed("anna", action, "scout1", "", 1.0).sentence
     assert "anna" in plain
     assert OperatorActed("anna", action, "scout1", "because", 1.0).sentence == f"{plain}: because"
+
+
+@pytest.mark.parametrize(("name", "known"), [("x" * 300, "x" * 255), (os.fsdecode(b"\xff"), r"\udcff"), ("ä", "ä")])
+def test_a_login_name_fits_in_every_message(monkeypatch: pytest.MonkeyPatch, name: str, known: str) -> None:
+    monkeypatch.setenv("LOGNAME", name)
+    acted = OperatorActed(login_name(), OperatorAction.SET_PARAMETER, "scout1", "", 1.0)
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(acted), type=OperatorActed).user == known
 
 
 def test_what_a_command_did_is_published_once_by_who_is_logged_in() -> None:
