@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -57,6 +58,14 @@ def test_a_recording_is_watched_at_a_terminal_and_no_mission_with_it(words: list
 def test_another_machines_mission_must_be_named() -> None:
     done = CliRunner().invoke(app, ["monitor", "--json", "--connect", "tcp/127.0.0.1:1"])
     assert done.exit_code == 2
+
+
+@pytest.mark.parametrize("name", ["x" * 256, "a\nb", os.fsdecode(b"\xff")])
+@pytest.mark.parametrize("command", ["attach", "monitor"])
+def test_a_persons_name_that_no_message_can_contain_or_no_text_can_show_is_wrong_usage(command: str, name: str) -> None:
+    done = CliRunner().invoke(app, [command, "--json", "--user", name])
+    assert done.exit_code == 2
+    assert "255 printable characters" in done.stderr
 
 
 @pytest.mark.processes
