@@ -34,6 +34,7 @@ from backbone.command_line.options import (
     complete_type,
     hub_endpoint,
     json_or_text,
+    legal_name,
     named_value,
     run,
     run_table,
@@ -341,9 +342,9 @@ def down(
 
 @app.command()
 def creator(
-    host: Annotated[str, typer.Option("--host", help="Name of this machine in the mission.")],
+    host: Annotated[str, typer.Option("--host", callback=legal_name, help="Name of this machine in the mission.")],
     connect: Annotated[str, typer.Option("--connect", callback=hub_endpoint, help="The mission's hub, tcp/HOST:PORT.")],
-    mission: Annotated[str, typer.Option("--mission", help="Name of the mission.")],
+    mission: Annotated[str, typer.Option("--mission", callback=legal_name, help="Name of the mission.")],
     secret_file: SecretFile = None,
     tag: Annotated[list[str] | None, typer.Option("--tag", help="A tag of this machine; repeatable.")] = None,
     record_to: Annotated[

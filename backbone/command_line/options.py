@@ -26,8 +26,10 @@ from backbone.command_line.standard_streams import standard_streams
 from backbone.command_line.where import Where
 from backbone.errors import BackboneError
 from backbone.launcher.endings import ExitCode
+from backbone.naming import IllegalName, legal
 
 DISTRIBUTION = "scout-backbone"
+MOST_PORT = 65_535  # RFC 9293: a port has 16 bits
 
 
 class CommandTable(TyperGroup):
@@ -127,7 +129,17 @@ def chosen(mission: str | None, endpoint: str | None, secret_file: Path | None) 
     """Return the mission that the options name; a hub elsewhere needs the mission's name."""
     if endpoint is not None and mission is None:
         raise typer.BadParameter("--connect needs --mission NAME")
-    return Where(mission, endpoint, secret_file)
+    return Where(legal_name(mission) if endpoint is not None else mission, endpoint, secret_file)
+
+
+def legal_name(value: str | None) -> str | None:
+    """Refuse a text that is no name; for options that name a host, or a mission that this machine does not know."""
+    if value is None:
+        return None
+    try:
+        return legal(value)
+    except IllegalName as illegal:
+        raise typer.BadParameter(str(illegal)) from None
 
 
 def print_version(is_asked: bool) -> None:
@@ -138,7 +150,7 @@ def print_version(is_asked: bool) -> None:
 
 
 ENDPOINT = re.compile(
-    r"((tcp|tls|quic|udp|ws)/(?P<host>[^\s/?#]+):[0-9]{1,5}|unixsock-stream/[^\s?#]+)(\?[^\s?#]+)?(#[^\s?]+)?"
+    r"((tcp|tls|quic|udp|ws)/(?P<host>[^\s/?#]+):(?P<port>[0-9]{1,5})|unixsock-stream/[^\s?#]+)(\?[^\s?#]+)?(#[^\s?]+)?"
 )
 """The form that Zenoh reads, with metadata and configuration at its end."""
 
@@ -148,7 +160,8 @@ def hub_endpoint(value: str | None) -> str | None:
     if value is None:
         return None
     found = ENDPOINT.fullmatch(value)
-    if found is None or not is_address((found["host"] or "").strip("[]")):
+    is_right = found is not None and 0 < int(found["port"] or 1) <= MOST_PORT
+    if found is None or not is_right or not is_address((found["host"] or "").strip("[]")):
         raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
     return value
 

@@ -10,12 +10,11 @@ from typing import Annotated
 import typer
 
 from backbone.command_line.extras import needing_extras
-from backbone.command_line.options import Endpoint, MissionName, SecretFile, chosen, run
+from backbone.command_line.options import MOST_PORT, Endpoint, MissionName, SecretFile, chosen, run
 from backbone.command_line.recording_commands import Keys
 
 BRIDGE_PORT = 8765  # where Foxglove looks first
 METRICS_PORT = 9464  # OpenTelemetry's port for Prometheus
-MOST_PORT = 65_535
 
 Host = Annotated[
     str, typer.Option("--host", help="Address to listen at; every client there can read all. Default: this machine.")

@@ -48,6 +48,7 @@ def test_help_tells_every_command_whole(command_line: Any) -> None:
         *("garbage", "tcp/", "tcp/host", "tcp/host:port", "192.0.2.7:7447", "ftp/host:1", ""),
         *("tcp/host:1?", "tcp/host:1#", "tcp/host:1#a=b?c=d", "tcp/#:1", "unixsock-stream//run/m#a?b"),
         *("tcp/192.0.2..7:7447", "tcp/lab..local:7447", "tcp/192.0.2.300:7447", "tcp/[::g]:7447"),
+        *("tcp/192.0.2.7:0", "tcp/192.0.2.7:65536"),
     ],
 )
 def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(command_line: Any, wrong: str) -> None:
@@ -67,6 +68,30 @@ def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(comma
 )
 def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
     assert hub_endpoint(right) == right
+
+
+HUB = ["--connect", "tcp/127.0.0.1:1"]
+
+
+@pytest.mark.parametrize("wrong", ["", "A b", "*", "ä"])
+@pytest.mark.parametrize(
+    ("command_line", "words", "option"),
+    [
+        (app, ["status", *HUB], "--mission"),
+        (console_app, ["monitor", "--json", *HUB], "--mission"),
+        (app, ["creator", *HUB, "--host", "field"], "--mission"),
+        (app, ["creator", *HUB, "--mission", "m"], "--host"),
+    ],
+    ids=["status", "monitor", "creator of a mission", "creator on a host"],
+)
+def test_a_name_that_no_mission_or_host_can_have_is_wrong_usage(
+    command_line: Any, words: list[str], option: str, wrong: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("backbone.command_line.options", "backbone.command_line.cli", "ui_console.cli"):
+        monkeypatch.setattr(f"{module}.run", lambda _: pytest.fail("the name was taken"))
+    done = CliRunner().invoke(command_line, [*words, option, wrong])
+    assert done.exit_code == 2
+    assert "legal name" in " ".join(done.output.split())
 
 
 @pytest.mark.parametrize(
