@@ -8,12 +8,11 @@ from typing import Annotated
 
 import typer
 
-from backbone.command_line.options import complete_behavior, complete_mission, hub_endpoint, names_for
+from backbone.command_line.options import complete_behavior, complete_mission, hub_endpoint, names_for, shown_name
 from ui_console.model.profile import Profile
 
 LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
 LONGEST_WAIT_S = 86_400.0  # chosen: a day, as in a mission file
-LONGEST_NAME = 255  # as ``ranges.LONGEST_MENTION``, whose module would load msgspec
 SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
 
 
@@ -21,13 +20,6 @@ def complete_robot(ctx: typer.Context) -> list[str]:
     """Return the robots of the running mission, for shell completion."""
     names = names_for(ctx)
     return names.robots if names is not None else []
-
-
-def _person(name: str) -> str:
-    """Refuse a name that messages cannot contain, or that texts cannot show."""
-    if len(name) > LONGEST_NAME or not name.isprintable():
-        raise typer.BadParameter(f"write a name of at most {LONGEST_NAME} printable characters")
-    return name
 
 
 _seconds = partial(typer.Option, min=0.0, max=LONGEST_WAIT_S)
@@ -43,7 +35,7 @@ Connect = Annotated[
     str | None, typer.Option("--connect", callback=hub_endpoint, help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")
 ]
 User = Annotated[
-    str, typer.Option("--user", callback=_person, help="Who you are, for the record; default: who is logged in.")
+    str, typer.Option("--user", callback=shown_name, help="Who you are, for the record; default: who is logged in.")
 ]
 
 # ---------------------------------------------------------------------- of attach

@@ -38,6 +38,7 @@ from backbone.command_line.options import (
     named_value,
     run,
     run_table,
+    shown_name,
 )
 from backbone.command_line.recording_commands import compare, record, recording, replay
 from backbone.command_line.tool_commands import bridge, metrics
@@ -291,7 +292,9 @@ def set_(
     name: Annotated[
         str,
         typer.Argument(
-            autocompletion=complete_name, help="A component, an ARC, a console, or a node of the behavior tree."
+            callback=shown_name,
+            autocompletion=complete_name,
+            help="A component, an ARC, a console, or a node of the behavior tree.",
         ),
     ],
     parameter: Annotated[

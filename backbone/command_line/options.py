@@ -29,6 +29,7 @@ from backbone.launcher.endings import ExitCode
 from backbone.naming import IllegalName, legal
 
 DISTRIBUTION = "scout-backbone"
+LONGEST_NAME = 255  # as ``ranges.LONGEST_MENTION``, whose module would load msgspec
 MOST_PORT = 65_535  # RFC 9293: a port has 16 bits
 
 
@@ -140,6 +141,13 @@ def legal_name(value: str | None) -> str | None:
         return legal(value)
     except IllegalName as illegal:
         raise typer.BadParameter(str(illegal)) from None
+
+
+def shown_name(value: str) -> str:
+    """Refuse a name that messages cannot contain, or that texts cannot show; for names of anything."""
+    if len(value) > LONGEST_NAME or not value.isprintable():
+        raise typer.BadParameter(f"write a name of at most {LONGEST_NAME} printable characters")
+    return value
 
 
 def print_version(is_asked: bool) -> None:
@@ -270,11 +278,14 @@ SecretFile = Annotated[
 NameOrCause = Annotated[
     str,
     typer.Argument(
+        callback=shown_name,
         autocompletion=complete_name,
         help="A component, resource, host, person or alarm; or a cause as stories show it: rc_manager#112.",
     ),
 ]
-ComponentName = Annotated[str, typer.Argument(autocompletion=complete_name, help="A component of the mission.")]
+ComponentName = Annotated[
+    str, typer.Argument(callback=shown_name, autocompletion=complete_name, help="A component of the mission.")
+]
 MOST_LINES = 1_000_000  # chosen: more than a person reads
 For = Annotated[float | None, typer.Option("--for", min=0.1, max=1e9, help="End after so many seconds.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]

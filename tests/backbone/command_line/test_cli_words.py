@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -68,6 +69,14 @@ def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(comma
 )
 def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
     assert hub_endpoint(right) == right
+
+
+@pytest.mark.parametrize("name", ["x" * 256, os.fsdecode(b"\xff")])
+@pytest.mark.parametrize("words", [["why"], ["story"], ["stop"], ["set"]])
+def test_a_name_that_no_message_can_contain_is_wrong_usage(words: list[str], name: str) -> None:
+    done = CliRunner().invoke(app, [*words, name])
+    assert done.exit_code == 2
+    assert "255 printable characters" in done.output
 
 
 HUB = ["--connect", "tcp/127.0.0.1:1"]
