@@ -26,7 +26,7 @@ from backbone.operating_system.process_starts import started_s
 FILE_NAME = "run.json"
 KEPT = ".kept"  # no legal name of a mission
 ENDED = ".ended-"  # the folder of an ending mission is renamed to .<mission>.ended-<pid of the zygote that removes it>
-LOOK_EVERY_S = 5.0  # chosen: such a mission is not lost by then, and an idle process rarely wakes; seconds of the machine
+LOOK_EVERY_S = 5.0  # chosen: soon enough for a mission that no command finds; seconds of the machine
 TRIAL_BYTES = 1 << 16  # chosen: a mission writes so much until it is ready, logs included
 
 
