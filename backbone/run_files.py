@@ -17,7 +17,6 @@ import msgspec
 
 from backbone.atomic_file import is_at, opened_locked, replace_file
 from backbone.authentication import secret_of
-from backbone.bus.interface import Clock
 from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
 from backbone.operating_system.file_locks import lock_alone_nowait
@@ -26,7 +25,6 @@ from backbone.operating_system.process_starts import started_s
 FILE_NAME = "run.json"
 KEPT = ".kept"  # no legal name of a mission
 ENDED = ".ended-"  # the folder of an ending mission is renamed to .<mission>.ended-<pid of the zygote that removes it>
-LOOK_EVERY_S = 5.0  # chosen: soon enough for a mission that no command finds; seconds of the machine
 TRIAL_BYTES = 1 << 16  # chosen: a mission writes so much until it is ready, logs included
 
 
@@ -148,16 +146,6 @@ def own_folder(mission: str) -> Iterator[Path]:
     finally:
         if is_at(descriptor, run_directory(mission)):  # else its zygote has hidden it, and this is its successor's
             remove(mission)
-        os.close(descriptor)
-
-
-async def wait_removed(folder: Path, clock: Clock) -> None:
-    """Return when the folder is no longer at its path."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
-        while is_at(descriptor, folder):
-            await clock.sleep_s(LOOK_EVERY_S * clock.rate)
-    finally:
         os.close(descriptor)
 
 

@@ -19,6 +19,7 @@ from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPo
 from backbone.creator.preload import preloaded_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
+from backbone.launcher.folder_watch import wait_removed
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 
@@ -108,7 +109,7 @@ class KeptCreator:
 
     async def wait_folder_removed(self, clock: Clock) -> None:
         """Return when the folder of the started creator is no longer there."""
-        await run_files.wait_removed(self._directory, clock)
+        await wait_removed(self._directory, clock)
 
     async def close(self) -> None:
         """End the creator and all its components. Idempotent."""

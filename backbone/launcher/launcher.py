@@ -25,6 +25,7 @@ from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.declared_orders import hardware_orders, unit_orders
 from backbone.launcher.ending_messages import AwaitLastBranch, EndMission, LastBranchOver, MissionEnding
+from backbone.launcher.folder_watch import wait_removed
 from backbone.launcher.hand_recorders import HandRecorderWatch
 from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch, ends_before
@@ -43,7 +44,7 @@ from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
-from backbone.run_files import RunFolderRemoved, wait_removed
+from backbone.run_files import RunFolderRemoved
 from backbone.waiting import first_of
 from backbone.wire import Accepts, Envelope, Message
 

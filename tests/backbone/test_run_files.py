@@ -1,6 +1,5 @@
 """Missions of this machine are found by name, and only while their launcher lives."""
 
-import asyncio
 import os
 import subprocess
 import sys
@@ -11,7 +10,6 @@ import pytest
 from full_disk import disk_full_at
 
 from backbone import run_files
-from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.errors import Refusal
 from backbone.run_files import (
     FolderInUse,
@@ -186,21 +184,3 @@ def test_a_mission_that_ends_leaves_its_successor_alone() -> None:
         with run_files.own_folder("iros2001"):
             ending.close()
             assert (folder / "log").is_dir()
-
-
-@pytest.mark.parametrize("by_another", [False, True], ids=["removed", "replaced"])
-def test_an_open_folder_is_missed_soon_after_its_removal(*, by_another: bool) -> None:
-    folder = run_files.prepare("one")
-
-    async def scene() -> None:
-        clock = VirtualClock()
-        missed = asyncio.create_task(run_files.wait_removed(folder, clock), name="missed")
-        await clock.sleep_s(60.0)
-        assert not missed.done()
-        folder.rename(folder.with_name("away"))
-        if by_another:
-            folder.mkdir()
-        await missed
-        assert clock.now_s() <= 60.0 + 2 * run_files.LOOK_EVERY_S
-
-    run_virtual(scene())
