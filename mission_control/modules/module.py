@@ -12,13 +12,14 @@ Source: RoboFrame 2006, section III: modules in threads, connected by key and ty
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 import msgspec
 
-from mission_control.modules.ports import ModulePorts, Ports, ports_of
+from mission_control.modules.ports import ModulePorts, Ports, WrongDeclaration, ports_of, type_name
 
 if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
     import numpy as np
@@ -85,8 +86,15 @@ class Module:
 
         When: at the creation of the module, and before its unit begins again. What: set every attribute that ``update``
         changes. A class that declares ``State`` and keeps nothing else needs no ``reset`` of its own.
+
+        Raises:
+            WrongDeclaration: ``State`` cannot be made without arguments.
         """
-        self.state = self.State()
+        try:
+            self.state = self.State()
+        except TypeError as error:
+            told = f"{type_name(self.State)} cannot be made: {error}"
+            raise WrongDeclaration(told, remedy="Give each field of State a default.") from error
 
     def is_ready(self) -> bool:
         """Return whether the module's outputs are good enough to use.
@@ -109,9 +117,30 @@ class Module:
         """Return the declared ports.
 
         Raises:
-            WrongDeclaration: A port cannot be read from its declaration.
+            WrongDeclaration: A port cannot be read from its declaration, or no unit could call ``update``.
         """
-        return ModulePorts(ports_of(cls.Inputs), ports_of(cls.Outputs))
+        declared = ModulePorts(ports_of(cls.Inputs), ports_of(cls.Outputs))
+        _check_update(cls)
+        return declared
+
+
+def _check_update(kind: type[Module]) -> None:
+    """Raise unless a unit can call ``update`` of this class and get its outputs."""
+    update = inspect.getattr_static(kind, "update").__get__(object(), kind)
+    try:
+        inspect.signature(update).bind(None)
+        wrong = ""
+    except TypeError as error:
+        wrong = f": {error}"
+    if kind.update is Module.update:
+        wrong = " is not declared"
+    elif inspect.iscoroutinefunction(update):
+        wrong = " is an async function, and a unit does not await it"
+    if wrong:
+        raise WrongDeclaration(
+            f"update of {type_name(kind)}{wrong}",
+            remedy="Write it as 'def update(self, inputs)'; it returns the outputs.",
+        )
 
 
 def default_name(kind: type[Module]) -> str:

@@ -75,6 +75,53 @@ def test_a_declaration_that_cannot_be_read_is_refused(declared: type[Ports], wor
         ports_of(declared)
 
 
+class Undeclared(Module):
+    pass
+
+
+class Awaiting(Module):
+    async def update(self, inputs: Any) -> Any:
+        return self.Outputs()
+
+
+class ByPort(Module):
+    def update(self, left: Any, right: Any) -> Any:  # type: ignore[override]
+        return self.Outputs()
+
+
+class Bare(Module):
+    @staticmethod
+    def update(inputs: Any) -> Any:
+        return Bare.Outputs()
+
+
+@pytest.mark.parametrize(
+    ("kind", "word"),
+    [
+        (Undeclared, "update of .*:Undeclared is not declared"),
+        (Awaiting, "update of .*:Awaiting is an async function"),
+        (ByPort, "update of .*:ByPort: missing a required argument: 'right'"),
+    ],
+)
+def test_an_update_that_no_unit_can_call_is_refused_before_the_first_round(kind: type[Module], word: str) -> None:
+    with pytest.raises(WrongDeclaration, match=word):
+        kind.ports()
+
+
+def test_an_update_may_need_no_self() -> None:
+    assert Bare.ports() == ModulePorts()
+
+
+class Forgetful(Module):
+    class State(Module.State):
+        last: float
+
+
+def test_a_state_without_a_default_is_refused_by_its_name() -> None:
+    with pytest.raises(WrongDeclaration, match=r"Forgetful\.State cannot be made: .*last.*Give each field"):
+        Forgetful()
+
+
 def test_a_mark_may_stand_inside_the_choice_of_nothing() -> None:
     assert ports_of(MarkInside) == (
         Port("number", "number", f"{Number.__module__}:Number", is_required=False, is_latest=True),
