@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 
+from backbone.component.class_faults import class_faults
 from backbone.component.component import AnyComponent, Component
 from backbone.errors import Refusal
 
@@ -19,7 +20,7 @@ def load_class(class_path: str) -> type[AnyComponent]:
     """Return the component class at ``package.module:Class``.
 
     Raises:
-        WrongClassPath: No component class has this path.
+        WrongClassPath: No component class has this path, or the class cannot work.
     """
     module_name, _, class_name = class_path.partition(":")
     try:
@@ -28,4 +29,6 @@ def load_class(class_path: str) -> type[AnyComponent]:
         raise WrongClassPath(f"{class_path}: {error}", class_path=class_path) from error
     if not (isinstance(found, type) and issubclass(found, Component)):
         raise WrongClassPath(f"{class_path} is no Component", class_path=class_path)
+    if faults := "; ".join(class_faults(found)):
+        raise WrongClassPath(f"{class_path}: {faults}", class_path=class_path, remedy="Mend the class.")
     return found

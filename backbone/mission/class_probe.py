@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from backbone.component.class_faults import class_faults
 from backbone.component.component import Component
 from backbone.component.field_docs import field_docs
 from backbone.mission.arranged import Arranged, UnitsQuestion
@@ -29,6 +30,8 @@ def facts_of(class_path: str) -> ClassFacts:
         return ClassFacts(failure=f"its module cannot be imported: {type(error).__name__}: {error}")
     if not (isinstance(found, type) and issubclass(found, Component)):
         return ClassFacts(failure="it is no component: it does not derive from backbone.component.component:Component")
+    if faults := "; ".join(class_faults(found)):
+        return ClassFacts(failure=faults)
     try:
         return _described(found)
     except Exception as error:  # a type of a parameter without a schema, or a hook of the class with a bug

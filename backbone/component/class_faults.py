@@ -1,0 +1,66 @@
+"""Faults of a component's class that show without an instance of it.
+
+A method that is async where the base class is not would do nothing, as nobody awaits it. Parameters that only the type
+checker knows would never be read.
+"""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from collections.abc import Iterator
+
+import msgspec
+
+
+def class_faults(kind: type) -> Iterator[str]:
+    """Yield a sentence, with the remedy, for each fault.
+
+    Example:
+        >>> class Base:
+        ...     def see(self, frame): ...
+        >>> class Own(Base):
+        ...     async def see(self, frame): ...
+        >>> list(class_faults(Own))
+        ["see is an 'async def'; write it as a 'def', as the base class does"]
+    """
+    for name in dir(kind):
+        definitions = [vars(one)[name] for one in kind.__mro__ if name in vars(one)]
+        own, base = definitions[0], definitions[-1]
+        if own is not base and not name.startswith("__") and inspect.isfunction(own) and inspect.isfunction(base):
+            yield from _of_override(name, own, base)
+    yield from _of_parameters(kind)
+
+
+def _of_override(name: str, own: typing.Any, base: typing.Any) -> Iterator[str]:
+    if _can_be_awaited(base) and not _can_be_awaited(own):
+        yield f"{name} is a 'def'; write it as an 'async def', as the base class does"
+    elif _can_be_awaited(own) and not _can_be_awaited(base):
+        yield f"{name} is an 'async def'; write it as a 'def', as the base class does"
+    else:
+        given = inspect.signature(base).parameters.values()
+        by_place = [one.name for one in given if one.kind is one.POSITIONAL_OR_KEYWORD and one.default is one.empty]
+        try:
+            inspect.signature(own).bind(*by_place)
+        except TypeError as error:
+            yield f"{name}: {error}; the base class has {name}({', '.join(by_place)})"
+
+
+def _can_be_awaited(function: typing.Any) -> bool:
+    """Return whether the result can be awaited, as far as the declaration shows it."""
+    plain = inspect.unwrap(function)
+    result = str(inspect.signature(plain).return_annotation)
+    return inspect.iscoroutinefunction(plain) or any(word in result for word in ("Awaitable", "Coroutine", "Future"))
+
+
+def _of_parameters(kind: type) -> Iterator[str]:
+    """Yield a fault if the class in the brackets of the base class is not the one from which parameters are read."""
+    taken = getattr(kind, "parameters_type", None)
+    written = (base for one in kind.__mro__ for base in vars(one).get("__orig_bases__", ()))
+    for base in written:
+        named = [one for one in typing.get_args(base) if isinstance(one, type) and issubclass(one, msgspec.Struct)]
+        if named and hasattr(typing.get_origin(base), "parameters_type"):
+            if taken is not None and not issubclass(taken, named[0]):
+                word = named[0].__name__
+                yield f"it has {word} in brackets and reads {taken.__name__}; write 'parameters_type = {word}' in it"
+            return

@@ -1,0 +1,76 @@
+"""A class whose methods nobody could call as the base class's are called is refused before it starts."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine, Mapping
+from typing import Any
+
+import pytest
+
+from backbone.component.class_faults import class_faults
+from backbone.component.class_path import WrongClassPath, load_class
+from backbone.mission.class_probe import facts_of
+from mission_control.behavior import Behavior, BehaviorParameters
+from resource_pool.arc_client import Frame
+
+
+class Quiet(Behavior[BehaviorParameters]):
+    def see(self, frame: Frame) -> None:
+        pass
+
+
+class Unseeing(Quiet):
+    async def see(self, frame: Frame) -> None:  # type: ignore[override]
+        pass
+
+
+class Unawaited(Quiet):
+    def act(self) -> None:  # type: ignore[override]
+        pass
+
+
+class Passing(Quiet):
+    def act(self) -> Coroutine[Any, Any, None]:
+        return super().act()
+
+    async def resumed(self, rcs: Mapping[str, str], more: int = 0) -> None:
+        pass
+
+
+class Short(Quiet):
+    async def suspended(self, reason: str) -> None:  # type: ignore[override]
+        pass
+
+
+class Speed(BehaviorParameters, frozen=True):
+    speed_m_s: float = 0.1
+
+
+class Unread(Behavior[Speed]):
+    pass
+
+
+class Read(Behavior[Speed]):
+    parameters_type = Speed
+
+
+@pytest.mark.parametrize(
+    ("kind", "fault"),
+    [
+        (Unseeing, "see is an 'async def'; write it as a 'def', as the base class does"),
+        (Unawaited, "act is a 'def'; write it as an 'async def', as the base class does"),
+        (Short, "suspended: too many positional arguments; the base class has suspended(self, reason, by)"),
+        (Unread, "it has Speed in brackets and reads BehaviorParameters; write 'parameters_type = Speed' in it"),
+    ],
+)
+def test_a_class_that_cannot_work_is_refused_by_check_at_its_start_and_by_swap(kind: type, fault: str) -> None:
+    assert list(class_faults(kind)) == [fault]
+    class_path = f"{kind.__module__}:{kind.__name__}"
+    assert facts_of(class_path).failure == fault
+    with pytest.raises(WrongClassPath, match="Mend the class"):
+        load_class(class_path)
+
+
+@pytest.mark.parametrize("kind", [Quiet, Passing, Read])
+def test_a_class_that_can_work_has_no_fault(kind: type) -> None:
+    assert list(class_faults(kind)) == []
