@@ -215,5 +215,5 @@ def last_lines(outcome: Outcome) -> list[str]:
     if outcome.pushed:
         lines.append("needed a signal to end: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
     if outcome.failure is not None:
-        return [*lines, f"the mission failed: {outcome.failure}"]
+        return [*lines, f"the mission failed: {outcome.why_failed}"]
     return [*lines, f"down: {counted(len(outcome.ended), 'component')} ended, nothing is left"]

@@ -126,7 +126,7 @@ class Launcher(Component[NoParameters]):
             await self._start_mission()
         except BackboneError as error:
             self.outcome.failure = error
-            self.end(f"could not come up: {error}")
+            self.end(f"could not come up: {self.outcome.why_failed}")
             return
         self.outcome.ready_after_s = time.monotonic() - self._began_s
         self.report(f"all ready; at the end: {self._last.name}" if self._last.name else "all ready")

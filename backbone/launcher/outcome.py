@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from backbone.bus.interface import Bus, Clock
-from backbone.creator.messages import EndedBy, ProcessEnded
+from backbone.creator.messages import EndedBy, ProcessEnded, StartFailed
 
 
 @dataclass
@@ -22,6 +22,13 @@ class Outcome:
     ready_after_s: float | None = None
     failure: BaseException | None = None
     ended: list[ProcessEnded] = field(default_factory=list)
+
+    @property
+    def why_failed(self) -> str:
+        """Why it failed, with the name of a component that refused to start."""
+        told = str(self.failure)
+        name = str(self.failure.facts.get("name", "")) if isinstance(self.failure, StartFailed) else ""
+        return told if told.startswith(name) else f"{name}: {told}"
 
     @property
     def pushed(self) -> list[ProcessEnded]:
