@@ -13,6 +13,20 @@ T = TypeVar("T")
 CUT_WITHIN_S = 0.1  # chosen: of the time for the safe state, so that it is reached even if a command goes on
 
 
+def applied_values(given: object, what: str) -> dict[str, float]:
+    """Return the applied values that ``obey`` returned.
+
+    Raises:
+        TypeError: They are not numbers by name.
+    """
+    try:
+        return {name: float(value) for name, value in dict(given).items()}  # type: ignore[call-overload]
+    except (TypeError, ValueError):
+        raise TypeError(
+            f"obey returned {given!r:.80} for {what}; return the applied values, each name with a number"
+        ) from None
+
+
 class OrdersInProgress:
     """The commands of all holds of one RC.
 

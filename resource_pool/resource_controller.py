@@ -54,6 +54,7 @@ from resource_pool.drivers.interface import (
 from resource_pool.hold_ends import FAULTS, SAFE_WITHIN_S, HoldEnds, detail_of
 from resource_pool.holds import Hold, HoldTable
 from resource_pool.messages import Applied, ImpossibleUse, NeedsRestart, NotFromYou
+from resource_pool.orders_in_progress import applied_values
 from resource_pool.rc_parameters import RcParameters, sort_out_options
 
 __all__ = ["RcParameters", "ResourceController"]
@@ -166,8 +167,8 @@ class ResourceController(Component[R], Generic[R]):
             return await super().answer(asked)
         hold = self.admit(order.arc, order.epoch)
         self.permit(order)
-        values = await self._ends.orders.run(hold, self.obey(hold, order))
-        return Applied(self.name, hold.epoch, self.clock.now_s(), order.word(), dict(values))
+        given = await self._ends.orders.run(hold, self.obey(hold, order))
+        return Applied(self.name, hold.epoch, self.clock.now_s(), order.word(), applied_values(given, order.word()))
 
     async def driver_exchanged(self) -> None:
         """Bring the driver to the state of this RC.

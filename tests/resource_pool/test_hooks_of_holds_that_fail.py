@@ -179,6 +179,30 @@ def test_a_bug_in_a_connection_ends_the_rc_in_its_safe_state(local_mission: Any,
     run_virtual(main())
 
 
+class SilentLamp(Lamp):
+    """A lamp whose author forgot the applied values, or gave a text."""
+
+    given: object = None
+
+    async def obey(self, hold: Hold, order: Command) -> Any:
+        return self.given
+
+
+@pytest.mark.parametrize("given", [None, {"brightness": "bright"}, 1.0], ids=repr)
+def test_what_obey_returned_in_place_of_applied_values_is_told(local_mission: Any, given: object) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            lamp = await pool.start(SilentLamp, "lights", {"driver": "resource_pool.rcs.skeleton:PaintedLamp"})
+            lamp.given = given
+            await _connect(pool, "one")
+            with pytest.raises(NoResponder):
+                await pool.voice("one").ask("resource_pool/lights", Shine(1.0).under("one", 1), Applied, within_s=1.0)
+            bug = await pool.outcome("lights")
+            assert str(bug) == f"obey returned {given!r} for shine; return the applied values, each name with a number"
+
+    run_virtual(main())
+
+
 class WarmingLamp(Lamp):
     """A lamp that needs 0.3 s until it shines."""
 
