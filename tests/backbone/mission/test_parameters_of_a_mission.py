@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import time
 from enum import Enum
 from pathlib import Path
 
@@ -194,6 +195,15 @@ def test_a_module_that_hangs_is_a_fault_and_holds_up_nothing_else(
     found = ask_classes(["own_hanging:Own", "own_after:Own"])
     assert "not imported within 5 s" in found["own_hanging:Own"].failure
     assert [one.name for one in found["own_after:Own"].parameters] == ["depth_m"]
+
+
+def test_a_thread_that_a_module_starts_holds_up_no_check(modules: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(class_asking, "WITHIN_S", 20.0)
+    thread = "import threading, time\nthreading.Thread(target=time.sleep, args=(60.0,)).start()\n"
+    (modules / "own_threaded.py").write_text(thread + GOOD)
+    began_s = time.monotonic()
+    assert not ask_classes(["own_threaded:Own"])["own_threaded:Own"].failure
+    assert time.monotonic() - began_s < 20.0
 
 
 def test_a_class_on_another_machine_may_be_one_that_cannot_be_imported_here(modules: Path) -> None:
