@@ -6,7 +6,7 @@ once. World and behaviors have files of their own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from backbone.authentication import is_address, is_loopback, is_reachable
 from backbone.component_database.messages import Multiplicity
@@ -17,6 +17,7 @@ from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH
 from backbone.mission.document import Element
 from backbone.mission.module_checks import check_modules
+from backbone.mission.needs_checks import check_needs, check_replaced
 from backbone.mission.parameter_checks import (
     check_class_parameters,
     check_class_path,
@@ -39,7 +40,6 @@ from backbone.mission.tables import (
     host_tags_lacking,
     is_known,
     parameters,
-    role_of,
     section,
 )
 from backbone.mission.world_checks import check_world
@@ -143,7 +143,9 @@ def _check_types(tables: Tables, report: Report) -> None:
     only_here = all(is_loopback(host.text("address")) for host in tables.hosts.values())
     for component_type in types:
         _check_core_type(component_type, report)
-        _check_needs(component_type, tables, report)
+        if component_type.place != tables.root.place:
+            check_needs(component_type, tables, report)
+            check_replaced(component_type, tables, report)
         _check_type_tags(component_type, tables, report)
         class_path = component_type.text("class")
         is_own = only_here and class_path not in shipped_classes() and CLASS_PATH.fullmatch(class_path)
@@ -172,47 +174,6 @@ def _check_core_type(component_type: Element, report: Report) -> None:
         why = "there is one on each host" if name == CREATOR else "there is one in a mission"
         report.fault(
             component_type.place_of("multiplicity"), f"multiplicity of {name}: {why}", f'Write multiplicity="{right}"'
-        )
-
-
-def _check_roles(needs: Sequence[Element], report: Report) -> None:
-    """Report every need that repeats the role of another need."""
-    first: dict[str, Element] = {}
-    for needed in needs:
-        role = role_of(needed)
-        before = first.setdefault(role, needed)
-        if role and before is not needed:
-            report.fault(
-                needed.place_of("role" if needed.text("role") else "type"),
-                f"a second need for role {quoted(role)}; the first is in line {before.place.line}",
-                'Give each a role of its own, role="…", or remove one',
-            )
-
-
-def _check_needs(component_type: Element, tables: Tables, report: Report) -> None:
-    needs = component_type.all("needs")
-    _check_roles(needs, report)
-    known = tables.resource_types()
-    for needed in needs:
-        is_known(needed, "type", "type of resource", known, report)
-    for used in dict.fromkeys(component_type.words("uses")):
-        if used not in known and is_legal(used):
-            report.fault(
-                component_type.place_of("uses"),
-                f"no type of resource is named {quoted(used)}{report.hint(used, known)}",
-                f"There is: {listed(known)}",
-            )
-    if component_type.words("uses") and not tables.is_resource_type(component_type.text("name")):
-        report.fault(
-            component_type.place_of("uses"),
-            f"type {component_type.text('name')} has no resources that could use others",
-            "Remove uses; an ARC says what it needs by <needs>",
-        )
-    if needs and component_type.text("subsystem") in set(Subsystem) - {Subsystem.RESOURCE_POOL}:
-        report.fault(
-            component_type.place_of("subsystem"),
-            "a type with <needs> is an ARC, which belongs to the resource pool",
-            'Write subsystem="resource_pool", or remove <needs>',
         )
 
 

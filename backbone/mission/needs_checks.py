@@ -1,0 +1,69 @@
+"""Checks of what a component type needs of others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from backbone.mission.document import Element
+from backbone.mission.report import Report, listed, quoted
+from backbone.mission.tables import Tables, is_known, role_of
+from backbone.naming import Subsystem, is_legal
+
+
+def check_replaced(component_type: Element, tables: Tables, report: Report) -> None:
+    """Report a type of the file's own that has the name of shipped hardware and is none."""
+    name = component_type.text("name")
+    users = [
+        one
+        for one, shipped in tables.types.items()
+        if shipped.place == tables.root.place
+        and name in [*shipped.words("uses"), *(needed.text("type") for needed in shipped.all("needs"))]
+    ]
+    if users and not tables.is_resource_type(name):
+        report.fault(
+            component_type.place_of("name"),
+            f"type {name} replaces the shipped hardware of this name, which {listed(users)} need, and is no hardware",
+            "Give it another name",
+        )
+
+
+def _check_roles(needs: Sequence[Element], report: Report) -> None:
+    """Report every need that repeats the role of another need."""
+    first: dict[str, Element] = {}
+    for needed in needs:
+        role = role_of(needed)
+        before = first.setdefault(role, needed)
+        if role and before is not needed:
+            report.fault(
+                needed.place_of("role" if needed.text("role") else "type"),
+                f"a second need for role {quoted(role)}; the first is in line {before.place.line}",
+                'Give each a role of its own, role="…", or remove one',
+            )
+
+
+def check_needs(component_type: Element, tables: Tables, report: Report) -> None:
+    """Report what a type needs or uses and no type of resource is."""
+    needs = component_type.all("needs")
+    _check_roles(needs, report)
+    known = tables.resource_types()
+    for needed in needs:
+        is_known(needed, "type", "type of resource", known, report)
+    for used in dict.fromkeys(component_type.words("uses")):
+        if used not in known and is_legal(used):
+            report.fault(
+                component_type.place_of("uses"),
+                f"no type of resource is named {quoted(used)}{report.hint(used, known)}",
+                f"There is: {listed(known)}",
+            )
+    if component_type.words("uses") and not tables.is_resource_type(component_type.text("name")):
+        report.fault(
+            component_type.place_of("uses"),
+            f"type {component_type.text('name')} has no resources that could use others",
+            "Remove uses; an ARC says what it needs by <needs>",
+        )
+    if needs and component_type.text("subsystem") in set(Subsystem) - {Subsystem.RESOURCE_POOL}:
+        report.fault(
+            component_type.place_of("subsystem"),
+            "a type with <needs> is an ARC, which belongs to the resource pool",
+            'Write subsystem="resource_pool", or remove <needs>',
+        )
