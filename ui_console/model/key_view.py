@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import msgspec
+
 from backbone.printable_text import printable
 from ui_console.model.message_views import (
     LONGEST_TEXT,
-    UNREADABLE,
     FieldRow,
     MessageView,
     PixelPicture,
@@ -75,8 +76,9 @@ class KeyView:
     def _shown(self, body: object) -> tuple[Sequence[FieldRow], PixelPicture | None]:
         if isinstance(body, Mapping):
             try:
-                return self._view.rows(body), self._view.picture(body)
-            except UNREADABLE as error:
+                rows = msgspec.convert(msgspec.to_builtins(self._view.rows(body)), list[FieldRow])
+                return rows, msgspec.convert(self._view.picture(body), PixelPicture | None)
+            except Exception as error:  # a view of another package raises anything
                 why = f"{type(self._view).__name__} cannot show it: {type(error).__name__} {error}"
                 self.trouble = printable(why, LONGEST_TEXT)
         return field_rows(body), None

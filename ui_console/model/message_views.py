@@ -16,6 +16,7 @@ from itertools import islice
 
 import msgspec
 
+from backbone.errors import complaint
 from backbone.printable_text import printable
 from backbone.spoken import counted
 
@@ -23,8 +24,6 @@ GROUP = "scout_backbone.views"
 MOST_ROWS = 200  # chosen: several screens; a longer message needs its own view
 MOST_ITEMS = 16  # chosen: of a longer list only the length is shown
 LONGEST_TEXT = 160  # chosen: one line of a wide terminal
-UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
-"""Exceptions that a view may raise for a message with unexpected fields."""
 
 log = logging.getLogger(__name__)
 
@@ -105,13 +104,16 @@ VIEWS: Views = {"Frame/1": PictureView, "ViewPicture/1": PictureView}
 
 @cache
 def installed_views() -> Views:
-    """Return the views of the installed packages, by schema; a view that cannot be loaded is left out."""
+    """Return the views of the installed packages, by schema; a package whose views cannot be loaded is left out."""
     found: dict[str, type[MessageView]] = {}
     for entry in entry_points(group=GROUP):
         try:
-            found |= entry.load()
-        except (ImportError, AttributeError) as error:
-            log.warning("the views of %s are left out: %s", entry.name, error)
+            table = msgspec.convert(entry.load(), dict[str, type])
+            if wrong := [schema for schema, kind in table.items() if not isinstance(kind(), MessageView)]:
+                raise TypeError(f"the view of {wrong[0]} is not derived from MessageView")
+            found |= table
+        except Exception as error:  # a module that is being written raises anything
+            log.warning("the views of %s are left out: %s", entry.name, complaint(error))
     return found
 
 

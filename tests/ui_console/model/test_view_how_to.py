@@ -7,11 +7,12 @@ import sys
 import tomllib
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
 from ui_console.model.key_view import KeyView
-from ui_console.model.message_views import GROUP, installed_views
+from ui_console.model.message_views import GROUP, VIEWS, FieldRow, MessageView, installed_views
 
 PAGE = Path(__file__).parents[3] / "docs/how-to/show-a-message-otherwise.md"
 
@@ -44,3 +45,61 @@ def test_the_example_shows_its_message_once_its_package_is_installed(
     assert view.names() == ["turn"]
     view.take({"grip": "open"}, 2.0, 2)
     assert view.trouble.startswith("TurnView cannot show it")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "VIEWS = {",
+        "raise RuntimeError('no library')",
+        "VIEWS = [1]",
+        "class VIEWS: ...",
+        "VIEWS = {'A/1': int}",
+        "class Wide:\n    def __init__(self, width): ...\nVIEWS = {'A/1': Wide}",
+    ],
+)
+def test_a_package_with_a_fault_in_its_views_is_left_out_and_named(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    about = tmp_path / "faulty-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(f"[{GROUP}]\nfaulty = faulty_views:VIEWS\n")
+    (tmp_path / "faulty_views.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    installed_views.cache_clear()
+    try:
+        assert VIEWS.items() <= installed_views().items()
+    finally:
+        installed_views.cache_clear()
+        sys.modules.pop("faulty_views", None)
+    assert "the views of faulty are left out" in caplog.text
+
+
+class Rowless(MessageView):
+    def rows(self, fields: object) -> Any:
+        return None
+
+
+class Textless(MessageView):
+    def rows(self, fields: object) -> Any:
+        return [FieldRow("turn", 90)]  # type: ignore[arg-type]
+
+
+class Pictureless(MessageView):
+    def picture(self, fields: object) -> Any:
+        return "a picture"
+
+
+class Raising(MessageView):
+    def rows(self, fields: object) -> Any:
+        raise RuntimeError("no library")
+
+
+@pytest.mark.parametrize("kind", [Rowless, Textless, Pictureless, Raising])
+def test_a_view_that_returns_no_rows_or_picture_leaves_the_table_and_says_so(kind: type[MessageView]) -> None:
+    view = KeyView("Turned/1", {"Turned/1": kind})
+    view.take({"turn": 1.5}, 1.0, 1)
+    assert [(row.name, row.text) for row in view.rows] == [("turn", "1.5")]
+    assert view.picture is None
+    assert view.trouble.startswith(f"{kind.__name__} cannot show it")
