@@ -17,9 +17,10 @@ SHIPPED = ("mission_control.", "resource_pool.")
 
 
 def preloaded_modules(types: Iterable[ComponentType], placed: Iterable[str] = ()) -> list[str]:
-    """Return the modules of the ARCs among these types, and of shipped types that are placed, by name.
+    """Return the modules of the shipped ARCs among these types, and of shipped types that are placed, by name.
 
-    ARCs start while a person waits for a robot; all other components start with the mission.
+    ARCs start while a person waits for a robot; all other components start with the mission. An ARC of one's own is not
+    among them: its module imports the RCs and commands that it needs, and their edited files would not be read again.
 
     Args:
         types: Types of the mission.
@@ -27,18 +28,19 @@ def preloaded_modules(types: Iterable[ComponentType], placed: Iterable[str] = ()
 
     Example:
         >>> from backbone.naming import Subsystem
-        >>> drive = ComponentType("drive", "lab.drive:Drive", Subsystem.RESOURCE_POOL, needs={"scout": "scout"})
+        >>> drive = ComponentType("drive", "resource_pool.drive:D", Subsystem.RESOURCE_POOL, needs={"scout": "scout"})
+        >>> own = ComponentType("own", "lab.drive:Drive", Subsystem.RESOURCE_POOL, needs={"scout": "scout"})
         >>> watch = ComponentType("watch", "mission_control.watch:Watch", Subsystem.MISSION_CONTROL)
-        >>> preloaded_modules([drive, watch], ["watch"])
-        ['lab.drive', 'mission_control.watch']
-        >>> preloaded_modules([drive, watch])
-        ['lab.drive']
+        >>> preloaded_modules([drive, own, watch], ["watch"])
+        ['mission_control.watch', 'resource_pool.drive']
+        >>> preloaded_modules([drive, own, watch])
+        ['resource_pool.drive']
     """
     expected = set(placed)
     return sorted(
         {
             one.class_path.partition(":")[0]
             for one in types
-            if one.needs or (one.name in expected and one.class_path.startswith(SHIPPED))
+            if (one.needs or one.name in expected) and one.class_path.startswith(SHIPPED)
         }
     )

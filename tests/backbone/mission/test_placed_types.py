@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 
 import msgspec
+import pytest
 
 from backbone.creator.preload import preloaded_modules
 from backbone.mission.reader import read_mission
@@ -25,8 +26,9 @@ def test_all_nodes_of_the_tree_are_counted_and_shipped_types_are_preloaded() -> 
     assert "mission_control.behaviors.jump" not in found
 
 
-def test_code_of_ones_own_is_read_anew_at_each_start() -> None:
+@pytest.mark.parametrize("name", ["watch_for_motion", "drive"])
+def test_code_of_ones_own_is_read_anew_at_each_start(name: str) -> None:
     mission = read_mission(Path(__file__).parents[3] / "mission.xml")
-    [shipped] = [one for one in mission.types if one.name == "watch_for_motion"]
-    own = msgspec.structs.replace(shipped, class_path="lab:Watch")
-    assert preloaded_modules([own], ["watch_for_motion"] * 2) == []
+    [shipped] = [one for one in mission.types if one.name == name]
+    own = msgspec.structs.replace(shipped, class_path="lab:Own")
+    assert preloaded_modules([own], [name] * 2) == []
