@@ -1,4 +1,4 @@
-"""End of a terminal's screen: a crash keeps its exit code, and keys typed before the end are dropped."""
+"""Begin and end of a terminal's screen: a crash keeps its exit code, and keys typed before the end are dropped."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ from typing import Any
 from textual.app import App
 from textual.events import Event, InputEvent
 
+from ui_console.terminal.driver import TerminalDriver
+
 
 class EndingApp(App[None]):
     """Base class of the consoles' screens."""
 
     _is_ending = False
+
+    def get_driver_class(self) -> type[TerminalDriver]:
+        """Return the driver of a terminal; a screen without one has Textual's headless driver."""
+        return TerminalDriver
 
     def exit(self, result: None = None, return_code: int = 0, message: Any = None) -> None:
         """End; after a crash, keep the crash's exit code."""
