@@ -1,19 +1,44 @@
 """Reads the keys of a terminal; bytes that are no key do nothing.
 
-Textual's driver ends the screen at a byte that is no UTF-8, or at a number that is too large.
+Textual's driver ends the screen at a byte that is no UTF-8, or at a number that is too large, and takes the characters
+of an unknown escape sequence for keys: shift and the 8 of some keypads would stop a robot and take another one.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import select
 from codecs import getincrementaldecoder
+from collections.abc import Iterable
 
 from textual._xterm_parser import XTermParser
 from textual.drivers.linux_driver import LinuxDriver
+from textual.events import Key
 
 READ_MOST_BYTES = 4096  # as Textual's driver
 TICK_S = 0.1  # as Textual's driver: an escape key is known by the pause after it
+ESCAPE = "\x1b"
+SEQUENCE = re.compile(r"\x1b[\[O][ -?]*[@-~]?")  # ECMA-48, 5.4: CSI and SS3, whole or its beginning
+
+
+class KnownKeys(XTermParser):
+    """Parser that drops the rest of an unknown escape sequence."""
+
+    _so_far = ""
+
+    def _sequence_to_key_events(self, sequence: str, alt: bool | None = None) -> Iterable[Key]:
+        """Return the keys of a sequence.
+
+        Args:
+            sequence: A whole sequence, or one character of an unknown one.
+            alt: Whether the character is the first one after escape; None: a whole sequence.
+        """
+        before = ESCAPE if alt else self._so_far
+        self._so_far = "" if alt is None else ESCAPE if sequence == ESCAPE else before + sequence
+        if alt is False and SEQUENCE.fullmatch(self._so_far):
+            return ()
+        return super()._sequence_to_key_events(sequence, alt=bool(alt))
 
 
 class TerminalDriver(LinuxDriver):
@@ -22,7 +47,7 @@ class TerminalDriver(LinuxDriver):
     def run_input_thread(self) -> None:
         """Read keys until the screen ends."""
         decode = getincrementaldecoder("utf-8")("replace").decode
-        parser = XTermParser()
+        parser = KnownKeys()
         while not self.exit_event.is_set():
             is_readable = select.select([self.fileno], [], [], TICK_S)[0]
             for character in decode(os.read(self.fileno, READ_MOST_BYTES)) if is_readable else "":
@@ -30,6 +55,6 @@ class TerminalDriver(LinuxDriver):
                     for event in parser.feed(character):
                         self.process_message(event)
                 except (ValueError, OverflowError):  # an escape sequence with an impossible number
-                    parser = XTermParser()
+                    parser = KnownKeys()
             for event in parser.tick():
                 self.process_message(event)
