@@ -44,8 +44,28 @@ class KnownKeys(XTermParser):
 class TerminalDriver(LinuxDriver):
     """Driver of a terminal in which a person may type anything."""
 
+    _is_reading = False
+
+    def start_application_mode(self) -> None:
+        """Begin to draw and to read keys.
+
+        After SIGSTOP and SIGCONT, end first what no handler has ended: of two threads that read keys, one would wait
+        for a key for ever, and the end of the screen for that thread.
+        """
+        if self._is_reading:
+            self._must_signal_resume = True
+            self.suspend_application_mode()
+        super().start_application_mode()  # type: ignore[no-untyped-call]  # Textual declares no types here
+
     def run_input_thread(self) -> None:
         """Read keys until the screen ends."""
+        self._is_reading = True
+        try:
+            self._read()
+        finally:
+            self._is_reading = False
+
+    def _read(self) -> None:
         decode = getincrementaldecoder("utf-8")("replace").decode
         parser = KnownKeys()
         while not self.exit_event.is_set():
