@@ -8,6 +8,9 @@ from backbone.component.class_faults import class_faults
 from backbone.component.component import AnyComponent, Component
 from backbone.errors import Refusal
 
+SHIPPED = ("backbone.", "mission_control.", "resource_pool.")
+"""Packages whose classes tests have judged: a judgment takes a millisecond of each start."""
+
 
 class WrongClassPath(Refusal):
     """The class path names no component class."""
@@ -29,6 +32,6 @@ def load_class(class_path: str) -> type[AnyComponent]:
         raise WrongClassPath(f"{class_path}: {error}", class_path=class_path) from error
     if not (isinstance(found, type) and issubclass(found, Component)):
         raise WrongClassPath(f"{class_path} is no Component", class_path=class_path)
-    if faults := "; ".join(class_faults(found)):
+    if not class_path.startswith(SHIPPED) and (faults := "; ".join(class_faults(found))):
         raise WrongClassPath(f"{class_path}: {faults}", class_path=class_path, remedy="Mend the class.")
     return found

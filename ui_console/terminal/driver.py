@@ -69,8 +69,10 @@ class TerminalDriver(LinuxDriver):
         decode = getincrementaldecoder("utf-8")("replace").decode
         parser = KnownKeys()
         while not self.exit_event.is_set():
-            is_readable = select.select([self.fileno], [], [], TICK_S)[0]
-            for character in decode(os.read(self.fileno, READ_MOST_BYTES)) if is_readable else "":
+            typed = b""
+            if select.select([self.fileno], [], [], TICK_S)[0] and not (typed := os.read(self.fileno, READ_MOST_BYTES)):
+                return  # the terminal was closed
+            for character in decode(typed):
                 try:
                     for event in parser.feed(character):
                         self.process_message(event)

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from backbone.component.class_faults import class_faults
-from backbone.component.class_path import WrongClassPath, load_class
+from backbone.component.class_path import SHIPPED, WrongClassPath, load_class
+from backbone.mission.class_facts import shipped_classes
 from backbone.mission.class_probe import facts_of
 from mission_control.behavior import Behavior, BehaviorParameters
 from resource_pool.arc_client import Frame
@@ -74,3 +75,10 @@ def test_a_class_that_cannot_work_is_refused_by_check_at_its_start_and_by_swap(k
 @pytest.mark.parametrize("kind", [Quiet, Passing, Read])
 def test_a_class_that_can_work_has_no_fault(kind: type) -> None:
     assert list(class_faults(kind)) == []
+
+
+@pytest.mark.parametrize("class_path", sorted(shipped_classes()))
+def test_no_shipped_class_has_a_fault(class_path: str) -> None:
+    """Their starts do not judge them."""
+    assert class_path.startswith(SHIPPED)
+    assert list(class_faults(load_class(class_path))) == []
