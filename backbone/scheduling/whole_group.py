@@ -23,6 +23,7 @@ from backbone.scheduling.groups import Group
 from backbone.scheduling.plan import GroupPlans, Plan
 from backbone.scheduling.planner import Slot, Turn, in_order_of_revocation
 from backbone.scheduling.precedence import by_precedence
+from backbone.scheduling.preemption import must_let_higher_go_first
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
@@ -91,7 +92,8 @@ class WholeGroupPlanner:
         last = max(place for place, arc in enumerate(order) if arc in possible)
         queued = order[: last + 1]  # later ARCs do not affect these
         if self.reserves:
-            return plans.due(queued, possible)
+            turn = plans.due(queued, possible)
+            return turn or (self._beside_held_back(group, queued, possible, now_s) if self._table.strict else None)
         while queued:
             by_time = GroupPlans(self._table, queued, group.arcs, now_s, slack_s=self._slack_s, among_equals=False)
             turn = by_time.due(queued, possible)
@@ -123,7 +125,7 @@ class WholeGroupPlanner:
         plan = functools.partial(Plan, self._table, now_s=now_s, slack_s=0.0, handed_over=True)
         if plan(order, group=group.arcs).start_s(turn.arc) == math.inf:
             return False
-        if self._delays_higher(turn.arc, order, group, now_s):
+        if self._delays(turn.arc, [arc for arc in order if arc.goes_before(turn.arc)], order, group, now_s):
             return False
         rest, ended = [*group.arcs], set[ArcEntry]()
         for holder in in_order_of_revocation(turn):
@@ -138,15 +140,36 @@ class WholeGroupPlanner:
             ended.add(holder)
         return True
 
-    def _delays_higher(self, arc: ArcEntry, order: list[ArcEntry], group: Group[ArcEntry], now_s: float) -> bool:
-        """Return whether a start now would delay a higher ARC that waits."""
-        higher = [other for other in order if other.state is RequestState.WAITING and other.goes_before(arc)]
-        if not higher:
+    def _beside_held_back(
+        self, group: Group[ArcEntry], order: list[ArcEntry], possible: Collection[ArcEntry], now_s: float
+    ) -> Turn | None:
+        """Return an ARC that starts in a gap which only ARCs that the policy holds back would fill.
+
+        What holds them back may last for ever, and the RCs would stay free as long.
+        """
+        free = [arc for arc in order if not must_let_higher_go_first(self._table, arc)]
+        if len(free) == len(order):
+            return None
+        now = Plan(self._table, free, group.arcs, now_s, slack_s=0.0)
+        holders = [holder for holder in group.arcs if holder.holds]
+        for place, arc in enumerate(free):
+            if arc in possible and now.starts_now(arc) and self._table.fits(arc, holders):
+                before = [other for other in free[:place] if not arc.goes_before(other)]
+                if not self._delays(arc, before, order, group, now_s):
+                    return Turn(arc, [])
+        return None
+
+    def _delays(
+        self, arc: ArcEntry, others: Sequence[ArcEntry], order: Sequence[ArcEntry], group: Group[ArcEntry], now_s: float
+    ) -> bool:
+        """Return whether a start now would delay one of these that wait."""
+        waiting = [other for other in others if other.state is RequestState.WAITING]
+        if not waiting:
             return False
         without = Plan(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
         first = [arc, *(other for other in order if other is not arc)]
         after = Plan(self._table, first, group.arcs, now_s, slack_s=self._slack_s)
-        return any(after.start_s(other) > without.start_s(other) + INSTANT_S for other in higher)
+        return any(after.start_s(other) > without.start_s(other) + INSTANT_S for other in waiting)
 
     def _needs_more(self, arc: ArcEntry, keepers: Sequence[ArcEntry], due: Sequence[ArcEntry]) -> bool:
         """Return whether the ARC does not fit beside the holders, or not beside holders and other due ARCs."""

@@ -56,6 +56,18 @@ def test_the_checker_finds_nothing_under_the_strict_policy(seed):
     assert violations(play(*random_mission(Random(seed), policy="strict"))) == []
 
 
+@pytest.mark.parametrize("seed", [132, 190])
+def test_the_strict_policy_forgets_no_turn_in_a_crowd(seed):
+    """Time alone changed the plan: one that was held back no longer fitted before a higher one's start."""
+    assert violations(play(*crowded_mission(Random(seed), policy="strict"))) == []
+
+
+@settings(max_examples=share(10))
+@given(seeds)
+def test_the_checker_finds_nothing_in_a_crowd_under_the_strict_policy(seed):
+    assert violations(play(*crowded_mission(Random(seed), policy="strict"))) == []
+
+
 @settings(max_examples=share(40))
 @given(seeds)
 def test_the_checker_finds_nothing_when_priorities_change(seed):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from simulated_switches import Bench, ask, load, manager, sharable, unit
+from simulated_switches import MISSION, Bench, ask, load, manager, sharable, unit
 
 from backbone.scheduling.events import Departed
 
@@ -116,6 +116,29 @@ def test_s10_under_strict_a_lower_one_never_runs_while_a_higher_one_waits():
     bench = mission(H1, H2, ask("l", "r2"), policy="strict")
     assert bench.runs("l") == []
     assert bench.verdict() == []
+
+
+def test_an_rc_does_not_stay_free_for_one_that_the_strict_policy_holds_back_for_ever():
+    """A console keeps v, so ``waits`` holds ``held`` back for ever; ``other`` is an equal of ``held`` and later."""
+
+    def of(arc: str, rcs: str, parent: str, priority: int):
+        return ask(arc, rcs, path=[(MISSION, 0), (parent, 1), (arc, priority)])
+
+    bench = Bench(manager(policy="strict"), unit("v"), unit("w"))
+    bench.tell(ask("person", "v", path=[("person", 100)], console=True))
+    for each in (
+        of("first", "w", "p", 3),
+        of("waits", "v", "p", 2),
+        of("held", "w", "p", 1),
+        of("both", "v w", "p", 0),
+    ):
+        bench.tell(each)
+    bench.at(1.0, of("other", "w", "q", 1))
+    bench.at(3.0, Departed("first"))
+    bench.run(60.0)
+    assert bench.verdict() == []
+    assert bench.runs("other") == [(3.0, None)]
+    assert bench.runs("held") == bench.runs("waits") == []
 
 
 @pytest.mark.parametrize(("count", "share", "fit"), [(3, 0.4, 2), (4, 0.4, 2), (5, 0.3, 3), (4, 0.3, 3)])
