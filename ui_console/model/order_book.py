@@ -74,6 +74,7 @@ class OrderBook:
     def __init__(self) -> None:
         self._given: dict[int, GivenOrder] = {}  # orders whose behavior runs or is being started
         self._removing: set[int] = set()
+        self._is_away = False
         self.last = 0
         """Number of the newest order; 0: none was given."""
 
@@ -122,11 +123,14 @@ class OrderBook:
         return [*self._finish_all(robot, why, rests=False), *(self._remove(given.number) for given in self._of(robot))]
 
     def away(self, why: str) -> list[Instruction]:
-        """Handle the absence of the operator: a robot returns to the mission as soon as its order is over."""
-        for number, given in self._given.items():
-            self._given[number] = replace(given, order=replace(given.order, then_release=True))
+        """Handle the absence of the operator: until ``back``, a robot returns to the mission when its order is over."""
+        self._is_away = True
         over = [robot for robot, given in self.orders.items() if given.state.is_final]
         return [step for robot in over for step in self.given_back(robot, why)]
+
+    def back(self) -> None:
+        """Handle the return of the operator."""
+        self._is_away = False
 
     # ------------------------------------------------------------------ events of the behaviors
     def based_on(self, number: int, by: str) -> list[Instruction]:
@@ -184,7 +188,7 @@ class OrderBook:
         was_final = given.state.is_final or number in self._removing
         final = [] if was_final else self._become(replace(given, state=OrderState.FAILED, why=why))
         goes = [] if number in self._removing else [self._remove(number)]  # the behavior may only be unreachable
-        takes = in_front and not was_final and not given.order.then_release
+        takes = in_front and not was_final and not self._then_releases(given)
         return [*final, *([Take(given.order.robot)] if takes else []), *goes]
 
     def removed(self, number: int) -> None:
@@ -200,9 +204,12 @@ class OrderBook:
         return [self._remove(one.number) for one in self._of(given.order.robot) if one.number < given.number]
 
     def _after(self, given: GivenOrder, *, in_front: bool) -> list[Instruction]:
-        if given.order.then_release:
+        if self._then_releases(given):
             return [self._remove(given.number)]
         return [Take(given.order.robot)] if in_front else []
+
+    def _then_releases(self, given: GivenOrder) -> bool:
+        return self._is_away or given.order.then_release
 
     def _finish_all(self, robot: str, why: str, *, rests: bool = True) -> list[Instruction]:
         told: list[Instruction] = []

@@ -121,8 +121,12 @@ class OrderKeeper:
         return bool(todo)
 
     def away(self, why: str) -> None:
-        """Record that the operator is away: each robot returns to the mission when its order is over."""
+        """Record that the operator is away; see ``OrderBook.away``."""
         self._carry_out(self._book.away(why))
+
+    def back(self) -> None:
+        """Record that the operator is there."""
+        self._book.back()
 
     # ------------------------------------------------------------------ the behaviors
     def reported(self, source: str, report: ChildReport) -> ReportNoted:

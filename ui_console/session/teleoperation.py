@@ -158,6 +158,7 @@ class Teleoperation(OrderVerbs):
     def touch(self) -> None:
         """Record that the operator is present; driving records that by itself."""
         self._presence.touch()
+        self._orders.back()
 
     def leave(self) -> None:
         """Stop the wheels and ignore held controls, because the operator turned away or the window lost the focus."""

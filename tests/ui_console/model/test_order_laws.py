@@ -119,6 +119,10 @@ class Operated(RuleBasedStateMachine):
         self.wanted.clear()
         self.do(self.book.away("away"))
 
+    @rule()
+    def come_back(self) -> None:
+        self.book.back()
+
     # ------------------------------------------------------------------ what happens by itself
     @precondition(lambda self: self.starting)
     @rule(data=st.data())

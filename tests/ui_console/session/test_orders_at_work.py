@@ -33,7 +33,7 @@ from backbone.mission_log.operators import OperatorAction
 from backbone.placer.messages import Start
 from mission_control.laboratory.simulation.whole_mission import mission_in_one_process
 from resource_pool.arc_client import AskPose, Pose, lift_stop, stop_robot
-from ui_console.model.events import CommandApplied, GivenBack, OrderChanged, TurnedTo
+from ui_console.model.events import Attention, CommandApplied, GivenBack, OrderChanged, TurnedTo
 from ui_console.model.orders import Order, OrderKind, group
 from ui_console.model.script import read_script
 from ui_console.session.scripted import ScriptDriver
@@ -123,6 +123,22 @@ def test_an_order_that_says_so_gives_the_robot_back_to_the_mission() -> None:
         assert not anna.behaviors()
 
     play(scene)
+
+
+@pytest.mark.parametrize("returns", [False, True], ids=["still away", "back"])
+def test_an_order_that_is_over_while_its_operator_is_away_gives_the_robot_back(returns: bool) -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered(6.0)
+        await anna.until(lambda: any(isinstance(event, Attention) for event in anna.shown))
+        if returns:
+            anna.console.touch()
+        await anna.state_becomes(DONE)
+        holder = f"{CONSOLE}-capture" if returns else "patrol-scout1-drive"
+        await anna.until(lambda: anna.grantee() == holder)
+        assert anna.console.is_held is returns
+
+    play(scene, away_after_s=4.0)
 
 
 def test_giving_the_robot_back_ends_its_order() -> None:
