@@ -60,16 +60,20 @@ class ShownAttributes:
     def of(self, attribute: str) -> list[str]:
         """Return one attribute of the component, or of each request, as lines for people.
 
+        The request of a component comes before its parameter, because an operator may have changed the request.
+
         Raises:
             WrongAttribute: No attribute has this name.
         """
-        if self.parameters is not None and attribute in self.parameters:
-            return [f"{self.name}: {attribute} is {value_text(self.parameters[attribute])}"]
+        is_parameter = self.parameters is not None and attribute in self.parameters
         lines = [
             f"{request.arc}: {attribute} is {value}"
             for request in self.requests
+            if not is_parameter or component_of(request.owner) == self.name
             for value in _values(request, attribute)
         ]
+        if not lines and self.parameters is not None and is_parameter:
+            return [f"{self.name}: {attribute} is {value_text(self.parameters[attribute])}"]
         if not lines:
             raise WrongAttribute(f"{self.name} has no {attribute}", name=self.name)
         return lines
