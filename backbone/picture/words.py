@@ -9,7 +9,7 @@ from backbone.scheduling.views import RequestView
 WANTED = "self"
 """The reason for a robot that the console itself gave back."""
 
-UNDECIDED = ("lost", "lease")
+UNDECIDED = ("lost", "lease", "silent")
 """The reasons for losses without a decision: the console was cut off, or paused."""
 
 _SENTENCES = {

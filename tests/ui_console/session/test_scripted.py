@@ -46,7 +46,13 @@ def test_a_robot_that_was_lost_is_told_in_a_sentence() -> None:
 
 
 def test_after_a_loss_that_nobody_decided_a_script_moves_nothing_before_a_halt() -> None:
-    for reason, is_held_back in (("lost", True), ("lease", True), ("slice", False), ("higher", False)):
+    for reason, is_held_back in (
+        ("lost", True),
+        ("lease", True),
+        ("silent", True),
+        ("slice", False),
+        ("higher", False),
+    ):
         driver = ScriptDriver(lambda _line: None, read_script(DRIVE))
         driver.show(Heard(3.0, Suspended("arc", reason, "console-9", -1.0)))
         driver.show(GRANTED)
