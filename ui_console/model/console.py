@@ -182,7 +182,7 @@ class ConsoleModel:
             lost=self._lost_view(now_s),
             link_down_s=link_down_s,
             moment=self.moment,
-            orders=self.orders.views(now_s),
+            orders=self.team.people.named_all(self.orders.views(now_s)),
         )
 
     @property
@@ -268,7 +268,7 @@ class ConsoleModel:
             return f"you hold {self.robot or 'no robot'}{slice_end}"
         if self.asked is None:
             if (given := self.orders.of(self.robot)) is not None:
-                return given.line
+                return self.team.people.named(given.line)
             if self._refused:
                 return f"you hold no robot: {self._refused}"
             there = "; ".join(self.other_screens())

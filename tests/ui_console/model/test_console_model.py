@@ -40,8 +40,11 @@ from ui_console.model.events import (
     GivenBack,
     Heard,
     LinkHeard,
+    OrderChanged,
     PictureSeen,
+    TurnedTo,
 )
+from ui_console.model.orders import GivenOrder, Order, OrderKind, OrderState
 from ui_console.model.views import AlarmKind, NodeState, Severity, view_json
 
 
@@ -261,3 +264,14 @@ def test_a_console_that_waits_says_the_reason_without_repeating_who_waits() -> N
     why = Why("console-1-capture", "waiting", [line], "3", [], -1.0, "")
     shown = model(ASK, Heard(2.0, why))
     assert shown.status_line(3.0) == "waiting for scout1: since 24.54 s (3.5 s) for console-9-capture"
+
+
+def test_an_order_whose_robot_a_person_took_names_that_person() -> None:
+    order = Order(OrderKind.RETURN, "scout1")
+    waits = GivenOrder(order, 1, OrderState.WAITING, "higher by console-8-capture")
+    ben = msgspec.structs.replace(component("ui_console/console-8", "console"), user="ben")
+    there = Components([ben], True, 0.0)
+    shown = model(Heard(8.0, SCHEDULE), Heard(8.0, there), TurnedTo(9.0, "scout1"), OrderChanged(9.0, waits))
+    own = shown.own(9.5)
+    assert own.status == "scout1: return (waiting: higher by ben)"
+    assert [(view.line, view.why) for view in own.orders] == [(own.status, "higher by ben")]
