@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from backbone.addresses import LAUNCHER, NAMESERVER
@@ -28,6 +28,7 @@ from backbone.launcher.messages import (
 )
 from backbone.mission.document import Element, outline
 from backbone.mission_log.operators import OperatorAction, publish_action
+from backbone.mission_log.people import People
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 from backbone.spoken import value_text
@@ -40,18 +41,26 @@ async def print_tree(where: Where, *, as_json: bool) -> ExitCode:
     """Print the tree with its version, and which of its behaviors run."""
     async with connected(where) as (bus, _):
         tree = await _tree(bus)
-        there = await bus.ask(
-            NAMESERVER, ListComponents(subsystem=Subsystem.MISSION_CONTROL), Components, within_s=REPLY_TIME_S
-        )
-    running = {component_of(component.address): component for component in there.components}
+        there = (await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)).components
     whole = outline(tree.text.encode())
     if as_json:
+        running = _running(there)
         found = [_plain(node, running) for node in _behaviors(whole.first("behaviors"))]
         show([json.dumps({"mission": whole.text("name"), "version": tree.version, "tree": found})])
         return ExitCode.DONE
-    show([f"mission {whole.text('name')}, version {tree.version} of its tree"])
-    show(_lines(whole.first("behaviors"), running, "  "))
+    show([f"mission {whole.text('name')}, version {tree.version} of its tree", *tree_lines(whole, there)])
     return ExitCode.DONE
+
+
+def tree_lines(mission: Element, there: Sequence[ComponentState]) -> list[str]:
+    """Return the tree as lines, with the names of people.
+
+    Args:
+        mission: The mission file with all changes of its tree.
+        there: The components of the mission.
+    """
+    lines = _lines(mission.first("behaviors"), _running(there), "  ")
+    return [*map(People(there).named, lines)]
 
 
 async def add_branch(where: Where, file: Path, below: str, place: int, seen: int | None) -> ExitCode:
@@ -164,6 +173,11 @@ def _mission(now: Tree) -> str:
 
 def _behaviors(node: Element | None) -> list[Element]:
     return [] if node is None else node.all("behavior")
+
+
+def _running(there: Sequence[ComponentState]) -> dict[str, ComponentState]:
+    behaviors = [one for one in there if one.address.startswith(f"{Subsystem.MISSION_CONTROL}/")]
+    return {component_of(one.address): one for one in behaviors}
 
 
 def _lines(node: Element | None, running: dict[str, ComponentState], margin: str) -> Iterator[str]:
