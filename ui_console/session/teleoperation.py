@@ -124,6 +124,7 @@ class Teleoperation(OrderVerbs):
 
     def take(self) -> None:
         """Claim the robot unless it is claimed; if its release is under way, right afterwards; its order ends."""
+        self.touch()
         if not self._orders.touched(self._robot):
             self._claim.take()
 
@@ -139,6 +140,7 @@ class Teleoperation(OrderVerbs):
             kind: Component type of the ARC; if it differs from the present one, the robot is released and claimed
                 again. Empty: the present type for the same robot, else the type in the console's parameters.
         """
+        self.touch()
         wished = self._next = (robot, kind)
         async with self._switching:
             await self._orders.wait_begun(self._robot)

@@ -307,6 +307,28 @@ def test_a_robot_whose_operator_touched_nothing_for_long_is_given_back_and_can_b
     placer_world(scene)
 
 
+@pytest.mark.parametrize("robot", ["", "scout2"])
+def test_an_operator_who_was_away_takes_a_robot_and_touches_nothing_more_loses_it_again(
+    robot: str, placer_world: Any, beside: Any
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        driven = console(placer, lambda event: None, away_after_s=20.0)
+        async with beside(driven):
+            await placer.wait(lambda: driven.is_held)
+            await placer.clock.sleep_s(21.0)
+            assert not placer.arcs
+            if robot:
+                await driven.switch(robot)
+            else:
+                driven.take()
+            await placer.wait(lambda: driven.is_held)
+            await placer.clock.sleep_s(21.0)
+            assert not placer.arcs
+
+    placer_world(scene)
+
+
 def test_a_hold_that_says_how_long_it_counts_ends_then_and_not_later(placer_world: Any, beside: Any) -> None:
     async def scene(placer: FakePlacer) -> None:
         placer.on_arc = grant_at_once
