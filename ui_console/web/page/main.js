@@ -285,15 +285,12 @@ for (const dialog of document.querySelectorAll("dialog")) {
   }).observe(dialog, { attributeFilter: ["open"] });
 }
 document.addEventListener("visibilitychange", () => say({ do: "here", is_there: !document.hidden }));
-let touchedAt = 0;
-addEventListener(
-  "pointerdown",
-  () => {
-    if (performance.now() - touchedAt < TOUCHED_EVERY_MS) return;
-    touchedAt = performance.now();
-    say({ do: "here", is_there: true });
-  },
-  true,
-);
+let touchedAt = -TOUCHED_EVERY_MS;
+function touched() {
+  if (performance.now() - touchedAt < TOUCHED_EVERY_MS) return;
+  touchedAt = performance.now();
+  say({ do: "here", is_there: true });
+}
+for (const touch of ["pointerdown", "keydown"]) addEventListener(touch, touched, true);
 
 login.begin();
