@@ -9,8 +9,9 @@ from backbone.component.messages import ComponentState
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.errors import Refusal
-from backbone.naming import component_of, did_you_mean
+from backbone.naming import Subsystem, address, component_of, did_you_mean
 from backbone.placer.messages import Start
+from backbone.scheduling.views import RequestView
 from resource_pool.arc_client import ROBOT
 from ui_console.model.arc_abilities import arc_abilities
 from ui_console.model.arc_kinds import arc_kind
@@ -108,6 +109,13 @@ def behavior_of(console: str, number: int) -> str:
         'console-7-order-3'
     """
     return f"{console}-order-{number}"
+
+
+def operator_of(request: RequestView) -> str:
+    """Return the owner of a request; for the behavior of an order, the console that gave the order."""
+    kind, _, console = request.priority.partition(":")[0].partition(" ")  # the first node of its path, see ``start_of``
+    is_order = kind == "console" and component_of(request.owner).startswith(f"{console}-order-")
+    return address(Subsystem.UI_CONSOLE, console) if is_order else request.owner
 
 
 def start_of(

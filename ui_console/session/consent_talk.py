@@ -28,6 +28,7 @@ from ui_console.model.consent import (
     require_console,
 )
 from ui_console.model.events import ConsentAsked, ConsentHeard, failed
+from ui_console.model.order_facts import operator_of
 from ui_console.session.feed import REPLY_TIME_S
 from ui_console.session.observer import AnyObserver
 
@@ -54,10 +55,10 @@ class ConsentTalk:
 
     Args:
         console: The console.
-        give_back: Releases the robot for the given reason; returns when that is done.
+        give_back: Releases this robot for the given reason; returns when that is done.
     """
 
-    def __init__(self, console: AnyObserver, give_back: Callable[[str], Awaitable[None]]) -> None:
+    def __init__(self, console: AnyObserver, give_back: Callable[[str, str], Awaitable[None]]) -> None:
         self._console, self._give_back = console, give_back
         console.answers.yield_robot = self._begin_to_yield
         self._unanswered = 0
@@ -93,7 +94,7 @@ class ConsentTalk:
         await asyncio.gather(*(self._ask_one(holder, question) for holder in holders))
 
     async def _who_holds(self, claim: Claim | None) -> list[str]:
-        """Return the addresses of the consoles that hold the robot or directly block the claim.
+        """Return the addresses of the consoles that hold the robot or directly block the claim, by stick or by order.
 
         Raises:
             NoOperatorToAsk: No console blocks the claim, or there is no claim.
@@ -103,7 +104,7 @@ class ConsentTalk:
         if claim is None:
             raise NoOperatorToAsk(f"{console.user} does not wait for a robot", remedy="Take the robot first.")
         schedule = await console.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
-        owners = {request.arc: request.owner for request in schedule.requests}
+        owners = {request.arc: operator_of(request) for request in schedule.requests}
         arcs = {arc for one in schedule.requests if one.arc == claim.arc for arc in one.blockers}
         arcs |= {holder.arc for rc in schedule.rcs if rc.rc == claim.robot for holder in rc.holders}
         blockers = {owners[arc] for arc in arcs - {claim.arc} if arc in owners}
@@ -155,5 +156,6 @@ class ConsentTalk:
 
     async def _yield_to(self, settled: list[Settled]) -> None:
         """Release the robot, then answer, so that the asker finds the robot free."""
-        await self._give_back(f"{settled[0].sought.user} may have it")
+        sought = settled[0].sought
+        await self._give_back(sought.robot, f"{sought.user} may have it")
         self._console.answers.settle(settled)

@@ -87,7 +87,7 @@ class Teleoperation(OrderVerbs):
         self._claim = ArcClaim(
             self, self._controls, see=see, keeps_arc=keeps_arc, shows_stops=not watches, taken=self._orders.taken
         )
-        self._consent = ConsentTalk(self, self.give_back)
+        self._consent = ConsentTalk(self, self._yield)
         self._hand_over = HandOver(self, self.give_back)
         self._waiting = Waiting(self, self._hand_over, self._waits_for)
         self._presence = OperatorPresence(self)
@@ -227,6 +227,7 @@ class Teleoperation(OrderVerbs):
         await self._claim.give_back(reason, for_good=for_good, wanted=wanted)
         if had_order and not had_stick:
             self._claim.given_back = True
+            self.answers.ended(True, reason)
             self.acted(OperatorAction.RELEASE, robot, reason)
             self.show(events.GivenBack(self.clock.now_s(), reason, True, wanted))
 
@@ -257,11 +258,20 @@ class Teleoperation(OrderVerbs):
         claim = Claim(self.parameters.arc(self.bus), robot, robot or ANY_ROBOT, self._claim.asked_s)
         self._consent.begin_ask(claim if is_waiting else None, why)
 
-    def _consent_at_once(self) -> Consent | None:
-        """Return the answer to a question for the robot if no decision is needed; None: the operator decides."""
-        if not self.is_held:
-            return Consent(not self._claim.is_asking, self.user, "holds nothing")
-        return Consent(False, self.user, "a script drives") if self._work is not None else None
+    def _consent_at_once(self, robot: str) -> Consent | None:
+        """Return the answer to a question for this robot if no decision is needed; None: the operator decides."""
+        if self.is_held or robot in self.orders:
+            return Consent(False, self.user, "a script drives") if self._work is not None else None
+        if self.orders:
+            return Consent(False, self.user, "has given orders to other robots")
+        return Consent(not self._claim.is_asking, self.user, "holds nothing")
+
+    async def _yield(self, robot: str, reason: str) -> None:
+        """Release this robot if it has an order, else the robot at the stick, which blocks the claim for this one."""
+        if robot in self.orders and robot != self._robot:
+            await self.end_order(robot)
+        else:
+            await self.give_back(reason)
 
     # ------------------------------------------------------------------ the component's hooks
     async def serve(self) -> None:
@@ -283,7 +293,7 @@ class Teleoperation(OrderVerbs):
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC's notices and the questions of other consoles for the robot or a lift of a stop."""
         if isinstance(asked.body, AskConsent):
-            return await self._consent.seek(asked.source, asked.body, self._consent_at_once())
+            return await self._consent.seek(asked.source, asked.body, self._consent_at_once(asked.body.robot))
         if isinstance(asked.body, AskHandOver):
             holds, by_script = self._claim.holding if self.is_held else "", self._work is not None
             return await self._hand_over.answer(asked.body, holds, self._claim.asked_s, by_script=by_script)

@@ -25,7 +25,7 @@ from ui_console.model.orders import Order, OrderKind, OrderState
 from ui_console.session.teleoperation import Teleoperation
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
-CONSOLE = "console-7"
+CONSOLE, BEN = "console-7", "console-8"
 FORWARD = MoveWish(0.1, 0.0)
 STARTING, RUNNING, WAITING = OrderState.STARTING, OrderState.RUNNING, OrderState.WAITING
 DONE, FAILED, ENDED = OrderState.DONE, OrderState.FAILED, OrderState.ENDED
@@ -48,6 +48,8 @@ class Operator:
 
     def __init__(self, running: RunningMission, made: list[Teleoperation], shown: list[ConsoleEvent]) -> None:
         self.running, self._made, self.shown = running, made, shown
+        self.others: list[ConsoleEvent] = []
+        """What the screens of Ben show."""
         self.acts: list[OperatorActed] = []
         running.bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, lambda heard: self.acts.append(heard.body))
 
@@ -58,6 +60,10 @@ class Operator:
     @property
     def now_s(self) -> float:
         return self.running.clock.now_s()
+
+    @property
+    def ben(self) -> Teleoperation:
+        return self._made[1]
 
     async def until(self, condition: Callable[[], Any], within_s: float = 20.0) -> None:
         until_s = self.now_s + within_s
@@ -76,6 +82,11 @@ class Operator:
 
     async def state_becomes(self, state: OrderState, robot: str = "scout1") -> None:
         await self.until(lambda: self.states(robot)[-1] is state)
+
+    async def ben_waits(self) -> None:
+        """Let Ben ask for scout1 at a console of lower priority."""
+        await self.running.start(Start("console", BEN, {"robot": "scout1", "kind": "drive", "priority": 50}))
+        await self.until(lambda: any(line["ev"] == "request" and BEN in str(line) for line in self.running.trace))
 
     def state(self, robot: str = "scout1") -> OrderState | None:
         given = self.console.orders.get(robot)
@@ -121,7 +132,9 @@ def play(scene: Scene, *, is_real: bool = False, **parameters: Any) -> None:
         shown: list[ConsoleEvent] = []
 
         def console(launch: Launch, bus: Bus, clock: Clock) -> Teleoperation:
-            made.append(Teleoperation(launch, bus, clock, show=shown.append, keeps_arc=True, user="anna"))
+            is_anna = launch.name == CONSOLE
+            show, user = (shown.append, "anna") if is_anna else (operator.others.append, "ben")
+            made.append(Teleoperation(launch, bus, clock, show=show, keeps_arc=True, user=user))
             return made[-1]
 
         async with mission_in_one_process(patrols(is_real=is_real), consoles={"console": console}) as running:
