@@ -157,13 +157,16 @@ class ArcClaim:
         self._decided.set()
 
     # ------------------------------------------------------------------ release
-    async def give_back(self, reason: str, *, for_good: bool = False, wanted: bool = True) -> None:
+    async def give_back(
+        self, reason: str, *, for_good: bool = False, wanted: bool = True, to_order: bool = False
+    ) -> None:
         """Release the robot; afterwards no ARC is claimed until the next ``take``.
 
         Args:
             reason: For people.
             for_good: End the ARC even if it could rest.
             wanted: False if the operator did not request the release.
+            to_order: True: an order of this operator gets the robot, so questions of others for it stay open.
         """
         self._takes_next = False  # this release is newer than a claim that waits
         self._releases += 1
@@ -171,7 +174,10 @@ class ArcClaim:
             async with self._giving_back:
                 self._kinds.cancel()
                 if self._arc is not None and (self.is_asking or for_good):
+                    was_asking = self.is_asking
                     await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
+                    if was_asking and not to_order:
+                        self._console.answers.ended(True, reason)
         finally:
             self._releases -= 1
         if self._takes_next and not self._releases and self._console.state is LifeState.READY:
@@ -214,7 +220,6 @@ class ArcClaim:
     def _record_given_back(self, reason: str, *, confirmed: bool, wanted: bool) -> None:
         console = self._console
         self._controls.record_drive_end(self.holding, reason)
-        console.answers.ended(True, reason)
         robot, self.holding = self.holding or console.parameters.robot or ANY_ROBOT, ""
         console.acted(
             OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which its ARC did not confirm'}"

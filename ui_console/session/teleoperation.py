@@ -235,7 +235,7 @@ class Teleoperation(OrderVerbs):
         """Give the robot from the stick to its order, which waits for it: no lower ARC gets it in between."""
         if robot == self._robot and self._claim.is_asking:
             self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
-            await self._claim.give_back(f"ordered: {order}")
+            await self._claim.give_back(f"ordered: {order}", to_order=True)
 
     def _take_back(self, robot: str) -> None:
         """Claim the robot for the stick, which has priority over the order."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from orders_on_a_mission import BEN, ENDED, Operator, play
 
-from ui_console.model.consent import Sought
+from ui_console.model.consent import Settled, Sought
 from ui_console.model.events import ConsentHeard
 
 
@@ -36,6 +36,21 @@ def test_a_robot_under_an_order_is_asked_for_and_given_back(is_at_stick: bool) -
         assert anna.states()[-1] is ENDED
         assert heard_by_ben(anna) == [(True, "")]
         assert anna.console.is_held is not is_at_stick
+
+    play(scene)
+
+
+def test_an_operator_who_gives_an_order_while_asked_has_not_given_the_robot_away() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ben_waits()
+        await ben_asks(anna)
+        await anna.ordered(15.0)
+        assert not any(isinstance(event, Settled) for event in anna.shown)
+        anna.console.decide(False)
+        await anna.until(lambda: heard_by_ben(anna))
+        assert heard_by_ben(anna) == [(False, "")]
+        assert not anna.ben.is_held
 
     play(scene)
 
