@@ -17,6 +17,7 @@ from backbone.ranges import Instant, Mention
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Message
+from ui_console.model.order_facts import operator_of
 from ui_console.session.feed import REPLY_TIME_S
 from ui_console.session.observer import AnyObserver
 
@@ -74,10 +75,10 @@ class HandOver:
 
     Args:
         console: One of the screens.
-        give_back: Releases its robot or its claim, for the given reason.
+        give_back: Releases this robot, or the claim for it, for the given reason.
     """
 
-    def __init__(self, console: AnyObserver, give_back: Callable[[str], Awaitable[None]]) -> None:
+    def __init__(self, console: AnyObserver, give_back: Callable[[str, str], Awaitable[None]]) -> None:
         self._console, self._give_back = console, give_back
         self._reason = f"{console.user} goes on at another screen"
 
@@ -96,17 +97,17 @@ class HandOver:
             return
         schedule = await console.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
         arcs = {holder.arc for rc in schedule.rcs if rc.rc == robot for holder in rc.holders}
-        owners = {request.owner for request in schedule.requests if request.arc in arcs}
+        owners = {operator_of(request) for request in schedule.requests if request.arc in arcs}
         for screen in sorted(owner for owner in owners if is_console(owner) and owner != console.address):
             if await self._ask(screen, AskHandOver(robot, console.user, since_s)) is ClaimOutcome.NEWER:
-                await self._give_back(self._reason)
+                await self._give_back(robot, self._reason)
                 return
 
-    async def answer(self, asked: AskHandOver, robot: str, since_s: float, *, by_script: bool) -> HandedOver:
-        """Release the robot if this console's person continues at another console; see ``decide``."""
+    async def answer(self, asked: AskHandOver, robot: str, since_s: float, by_script: bool) -> HandedOver:
+        """Release the robot held here if its person continues at another console; see ``decide``."""
         outcome = decide(asked, self._console.person(), robot, since_s, by_script=by_script)
         if outcome is ClaimOutcome.GIVEN:
-            await self._give_back(self._reason)
+            await self._give_back(robot, self._reason)
         return HandedOver(outcome)
 
     async def _ask(self, holder: str, question: AskHandOver) -> ClaimOutcome:

@@ -74,6 +74,7 @@ class OrderKeeper:
     ) -> None:
         self._console, self._robot, self._hand_over, self._take = console, robot, hand_over, take
         self._book = OrderBook()
+        self._given_s: dict[str, float] = {}
         self._carrying: dict[int, asyncio.Task[None]] = {}
         self._removals: dict[int, asyncio.Task[None]] = {}
         self._changed = asyncio.Event()
@@ -88,12 +89,17 @@ class OrderKeeper:
         """Return whether this robot has an unfinished order."""
         return self._book.goes_on(robot)
 
+    def given_s(self, robot: str) -> float:
+        """Return the time of this robot's newest order."""
+        return self._given_s[robot]
+
     def give(self, orders: Sequence[Order]) -> list[int]:
         """Give these orders at the same time, and show the outcome of each; return their numbers."""
         return [self._give(order if order.robot else replace(order, robot=self._robot())) for order in orders]
 
     def _give(self, order: Order) -> int:
         self._console.acted(OperatorAction.ORDER, order.robot or ANY_ROBOT, order.sentence)
+        self._given_s[order.robot] = self._console.clock.now_s()
         self._carry_out(self._book.give(order))
         return self._book.last
 

@@ -88,7 +88,7 @@ class Teleoperation(OrderVerbs):
             self, self._controls, see=see, keeps_arc=keeps_arc, shows_stops=not watches, taken=self._orders.taken
         )
         self._consent = ConsentTalk(self, self._yield)
-        self._hand_over = HandOver(self, self.give_back)
+        self._hand_over = HandOver(self, self._yield)
         self._waiting = Waiting(self, self._hand_over, self._waits_for)
         self._presence = OperatorPresence(self)
         self._next: tuple[str, str] | None = None
@@ -266,8 +266,14 @@ class Teleoperation(OrderVerbs):
             return Consent(False, self.user, "has given orders to other robots")
         return Consent(not self._claim.is_asking, self.user, "holds nothing")
 
+    def _held_since(self, robot: str) -> tuple[str, float]:
+        """Return this robot and the time of its order; without an order, the robot at the stick and its claim."""
+        if robot in self.orders:
+            return robot, self._orders.given_s(robot)
+        return self._claim.holding if self.is_held else "", self._claim.asked_s
+
     async def _yield(self, robot: str, reason: str) -> None:
-        """Release this robot if it has an order, else the robot at the stick, which blocks the claim for this one."""
+        """Release this robot if it has an order, else the robot at the stick."""
         if robot in self.orders and robot != self._robot:
             await self.end_order(robot)
         else:
@@ -295,8 +301,7 @@ class Teleoperation(OrderVerbs):
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once(asked.body.robot))
         if isinstance(asked.body, AskHandOver):
-            holds, by_script = self._claim.holding if self.is_held else "", self._work is not None
-            return await self._hand_over.answer(asked.body, holds, self._claim.asked_s, by_script=by_script)
+            return await self._hand_over.answer(asked.body, *self._held_since(asked.body.robot), self._work is not None)
         if isinstance(asked.body, AskLift) and self._work is not None:
             stopped_it = asked.body.console == self.address
             return Consent(False, self.user, "a script drives, and stopped it", is_here=stopped_it)

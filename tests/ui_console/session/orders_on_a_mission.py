@@ -83,9 +83,10 @@ class Operator:
     async def state_becomes(self, state: OrderState, robot: str = "scout1") -> None:
         await self.until(lambda: self.states(robot)[-1] is state)
 
-    async def ben_waits(self) -> None:
-        """Let Ben ask for scout1 at a console of lower priority."""
-        await self.running.start(Start("console", BEN, {"robot": "scout1", "kind": "drive", "priority": 50}))
+    async def ben_waits(self, priority: int = 50) -> None:
+        """Let Ben ask for scout1 at another console, by default of lower priority."""
+        given = {"robot": "scout1", "kind": "drive", "priority": priority, "minimum_runtime_s": 1.0}
+        await self.running.start(Start("console", BEN, given))
         await self.until(lambda: any(line["ev"] == "request" and BEN in str(line) for line in self.running.trace))
 
     def state(self, robot: str = "scout1") -> OrderState | None:
@@ -126,14 +127,14 @@ async def until_over(running: RunningMission, name: str) -> None:
 Scene = Callable[[Operator], Awaitable[None]]
 
 
-def play(scene: Scene, *, is_real: bool = False, **parameters: Any) -> None:
+def play(scene: Scene, *, is_real: bool = False, other: str = "ben", **parameters: Any) -> None:
     async def main() -> None:
         made: list[Teleoperation] = []
         shown: list[ConsoleEvent] = []
 
         def console(launch: Launch, bus: Bus, clock: Clock) -> Teleoperation:
             is_anna = launch.name == CONSOLE
-            show, user = (shown.append, "anna") if is_anna else (operator.others.append, "ben")
+            show, user = (shown.append, "anna") if is_anna else (operator.others.append, other)
             made.append(Teleoperation(launch, bus, clock, show=show, keeps_arc=True, user=user))
             return made[-1]
 
