@@ -42,10 +42,10 @@ def test_a_type_takes_the_place_of_the_shipped_one_of_its_name(tmp_path: Path) -
     assert (drive.class_path, drive.needs, drive.restart) == ("backbone.component.component:Component", {}, True)
 
 
-def test_a_fault_of_a_shipped_type_stands_at_the_begin_of_the_mission(tmp_path: Path) -> None:
+def test_a_fault_of_a_type_that_replaces_shipped_hardware_stands_at_it(tmp_path: Path) -> None:
     own = '<type name="scout" class="backbone.component.component:Component" subsystem="mission_control"/>'
     faults = faults_in(tmp_path, f'\n<mission name="m" priority="1"><types>{own}</types></mission>')
-    assert {(fault.line, fault.column) for fault in faults} == {(2, 1)}
+    assert {(fault.line, fault.column) for fault in faults} == {(2, 45)}
 
 
 def test_every_host_runs_a_creator_and_the_first_the_other_services(tmp_path: Path) -> None:
