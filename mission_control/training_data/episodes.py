@@ -1,8 +1,9 @@
 """Episodes: a robot's pictures, reports and actions in each of its grants, at a fixed rate. Pure.
 
-An episode is the time in which one ARC held the robot under one epoch, according to the robot's RC. It begins with the
-first step at which each camera has sent a picture and the robot has reported all its readings. A step has the newest
-data sent before it, so it contains nothing that the commander could not know.
+An episode is the time in which one ARC held the robot under one epoch, according to the robot's RC; the holder at the
+recording's begin is that of the first schedule. It begins with the first step at which each camera has sent a picture
+and the robot has reported all its readings. A step has the newest data sent before it, so it contains nothing that the
+commander could not know.
 
 Source: a step (observation and present action) has the form of LeRobot's steps, see ``lerobot_dataset``.
 """
@@ -19,6 +20,7 @@ from backbone.rc_manager.messages import Connect, Connected, Disconnected, RcSta
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recorded
 from backbone.recording.revival import revived
+from backbone.scheduling.requests import Holder
 from backbone.scheduling.views import Schedule
 from backbone.wire import schema_of
 from resource_pool.arc_client import Applied, Frame, Halt, Readings
@@ -98,6 +100,7 @@ def survey(messages: Iterable[Recorded], robot: str) -> Survey:
                 schedule = revived(Schedule, message.body)
                 found.owners.update((request.arc, request.owner) for request in schedule.requests)
                 found.robots.update(rc.rc for rc in schedule.rcs if rc.is_robot)
+                found.arcs.update(holder.arc for holder in _holders(schedule, robot))
                 found.kind = next((rc.kind for rc in schedule.rcs if rc.rc == robot), found.kind)
             case _Schema.STATE if (state := revived(ComponentState, message.body)).user:
                 found.users[state.address] = state.user
@@ -124,8 +127,10 @@ class Follower:
         self.grants = self.episodes = 0
         self._its = address(Subsystem.RESOURCE_POOL, robot)
         self._reports, self._cameras, self._rate_hz = tuple(reports), frozenset(cameras), rate_hz
+        self._robot = robot
         self._asked: Connect | None = None
         self._arc, self._epoch = "", 0
+        self._is_holder_known = False
         self._values: dict[str, float] = {}
         self._begin_s: float | None = None
         self._number = 0
@@ -156,6 +161,10 @@ class Follower:
         match message.schema:
             case _Schema.CONNECT if _address_in(message.key) == self._its:
                 self._asked = revived(Connect, message.body)
+            case _Schema.SCHEDULE if not self._is_holder_known:
+                self._is_holder_known = True  # later grants are told by the RC
+                for holder in _holders(revived(Schedule, message.body), self._robot):
+                    self._begin(holder.arc, holder.epoch)
             case _Schema.FRAME if self._arc and _fields(message).get("arc") == self._arc:
                 self._pictures[_camera(message.key)] = revived(Frame, message.body)
             case _ if message.source == self._its:
@@ -192,12 +201,14 @@ class Follower:
             self._action = (told.values[ACTION[0]], told.values[ACTION[1]])
 
     def _begin(self, arc: str, epoch: int) -> None:
+        self._is_holder_known = True
         if epoch != self._epoch:
             self._end()
             self._arc, self._epoch = arc, epoch
             self.grants += 1
 
     def _end(self) -> None:
+        self._is_holder_known = True
         self._arc, self._epoch, self._begin_s, self._number = "", 0, None, 0
         self._action, self._pictures = STILL, {}
 
@@ -214,6 +225,10 @@ class _Schema:
 def _fields(message: Recorded) -> dict[str, Any]:
     """Return the fields of a message; a picture is not decoded, because it may not be needed."""
     return message.body if isinstance(message.body, dict) else {}
+
+
+def _holders(schedule: Schedule, robot: str) -> list[Holder]:
+    return [holder for rc in schedule.rcs if rc.rc == robot for holder in rc.holders]
 
 
 def _address_in(key: str) -> str:

@@ -19,13 +19,13 @@ ARCS = {"watch-capture": WATCHER, "console-1-drive": CONSOLE}
 WIDTH_PX, HEIGHT_PX = 4, 2
 
 
-def known(at_s: float) -> list[Said]:
-    """Return what tells whose the ARCs are: the schedule, and that anna sits at the console."""
+def known(at_s: float, *holders: Holder) -> list[Said]:
+    """Return what tells whose the ARCs are: the schedule, with the robot's holders, and anna at the console."""
     requests = [
         RequestView(arc, owner, RequestState.WAITING, ["scout1"], 0.0, -1.0, -1.0, "", [], 5.0, "night:1", 0)
         for arc, owner in ARCS.items()
     ]
-    robot = RcView("scout1", "scout", "up", False, 1.0, [], 0, [], is_robot=True)
+    robot = RcView("scout1", "scout", "up", False, 1.0, list(holders), 0, [], is_robot=True)
     state = ComponentState(CONSOLE, "console", "base", 1, LifeState.READY, 0.0, user="anna")
     return [
         Said(at_s, CONSOLE, Conversation.STATUS, state, CONSOLE),

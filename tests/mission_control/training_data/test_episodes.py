@@ -14,6 +14,7 @@ from small_recordings import SCOUT, Said, recorded
 from backbone.keys import Conversation
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
+from backbone.scheduling.requests import Holder
 from mission_control.training_data.episodes import OWN_CAMERA, STILL, EpisodeStep, Follower, Survey, keys_of, survey
 
 RATE_HZ = 10
@@ -32,9 +33,11 @@ happenings = st.one_of(
 nights = st.lists(st.tuples(st.floats(0.02, 0.5), happenings), max_size=25)
 
 
-def followed(said: Iterable[Said], cameras: Iterable[str] | None = None) -> tuple[Survey, Follower, list[EpisodeStep]]:
-    """Return what a robot did in a recording of these messages."""
-    file = recorded([*known(0.1), *said])
+def followed(
+    said: Iterable[Said], cameras: Iterable[str] | None = None, first: Iterable[Said] = ()
+) -> tuple[Survey, Follower, list[EpisodeStep]]:
+    """Return what a robot did in a recording of these messages; ``first`` tells whose the ARCs are."""
+    file = recorded([*(first or known(0.1)), *said])
     found = survey(Recording(file).messages(keys_of("scout1")), "scout1")
     follower = Follower("scout1", found.reports, found.sizes_px if cameras is None else cameras, RATE_HZ)
     return found, follower, list(follower.follow(Recording(file).messages(keys_of("scout1"))))
@@ -143,6 +146,14 @@ def test_a_person_is_named_by_name_and_a_behavior_by_its_own() -> None:
 def test_a_grant_that_began_before_the_recording_is_known_by_what_the_robot_says() -> None:
     found, follower, steps = followed([holding(1.0, DRIVE, 7), moved(1.05, 7, 0.5, 0.0), holding(2.0, "", 7)])
     assert (found.kind, found.arcs, follower.grants) == ("scout", {DRIVE}, 1)
+    assert [step.action for step in steps] == [STILL, *[(0.5, 0.0)] * 9]
+
+
+def test_a_grant_that_began_before_the_recording_is_in_the_first_schedule() -> None:
+    later = known(3.0, Holder(WATCH, 8, 3.0, 5.0))
+    said = [reported(1.0, way_m=1.0), moved(1.05, 7, 0.5, 0.0), *disconnected(2.0, DRIVE, 7), *later]
+    found, follower, steps = followed(said, first=known(0.1, Holder(DRIVE, 7, 0.0, 2.0)))
+    assert (found.arcs, follower.grants) == ({DRIVE, WATCH}, 1)
     assert [step.action for step in steps] == [STILL, *[(0.5, 0.0)] * 9]
 
 
