@@ -15,7 +15,7 @@ from backbone.command_line.unusable_file import new_folder
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.hearing import is_meant
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.tables import FIRST_COLUMNS, Commanders, row_of, table_of
+from backbone.recording.tables import FIRST_COLUMNS, TOLD_IN, Commanders, row_of, table_of
 from backbone.spoken import counted
 
 VIDEOS = "mission_control.vision.recorded_video"  # named as text, because imports run downwards only
@@ -106,7 +106,7 @@ def _write_tables(recording: Recording, tables: TableWriter, keys: tuple[str, ..
 def _commanded_rows(
     recording: Recording, keys: tuple[str, ...], *, splits_lists: bool
 ) -> Iterator[tuple[Recorded, dict[str, object]]]:
-    commanders = Commanders()
+    commanders = Commanders(recording.messages(TOLD_IN, newest_first=True))
     for message in recording.messages():
         commanders.take(message)
         if not keys or is_meant(message.key, keys):

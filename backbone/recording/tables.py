@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from backbone.keys import Conversation
 from backbone.recording.reader import Recorded
 
 FIRST_COLUMNS = ("at_s", "source", "sequence", "cause", "commanded_by")
 LONGEST_LIST = 64  # chosen: a laser scan has more, and is not a table
 BYTES_OF = "pixels"
 """Field of a picture that gets no column."""
+TOLD_IN = tuple(f"*/{said}" for said in (Conversation.SCHEDULE, Conversation.ASK, Conversation.STATUS))
+"""Keys of the messages by which ``Commanders`` knows them."""
 
 
 def table_of(message: Recorded) -> str:
@@ -68,12 +71,18 @@ class Commanders:
 
     It takes the messages of a recording in their order. Only the ARC that holds a robot moves it, under its epoch.
     Therefore the owner of that ARC commanded the robot's actions, and the view of its camera.
+
+    Args:
+        newest_first: The same messages in the opposite order, because a recording tells who holds a robot, and who
+            sits at a console, only after its first messages of them; ``TOLD_IN`` has the keys that are needed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, newest_first: Iterable[Recorded] = ()) -> None:
         self._owners: dict[str, str] = {}
         self._users: dict[str, str] = {}
         self._arcs: dict[tuple[str, int], str] = {}
+        for message in newest_first:
+            self.take(message)
 
     def take(self, message: Recorded) -> None:
         """Record the owner of each ARC, the ARC of each epoch of an RC, and the person at each console."""
@@ -81,7 +90,9 @@ class Commanders:
         if not isinstance(body, dict):
             return
         if message.schema.startswith("Schedule/"):
-            self._owners = {request["arc"]: request["owner"] for request in body.get("requests", [])}
+            self._owners.update((request["arc"], request["owner"]) for request in body.get("requests", []))
+            for rc in body.get("rcs", []):  # the recording may have begun after the ARC was connected
+                self._arcs.update(((rc["rc"], holder["epoch"]), holder["arc"]) for holder in rc["holders"])
         elif message.schema.startswith("Connect/"):
             self._arcs[message.key.split("/")[-2], body["epoch"]] = body["arc"]
         elif message.schema.startswith("ComponentState/") and body.get("user"):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from backbone.errors import Refusal
 from backbone.recording.hearing import is_meant
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.tables import Commanders
+from backbone.recording.tables import TOLD_IN, Commanders
 
 RATE_HZ = 15.0  # NTSC framegrabber of the Scouts at half rate; a gap in time is a gap in the recording
 LINE_PX = 24  # chosen: a line of text below the picture
@@ -35,7 +35,7 @@ def write_videos(recording: Recording, folder: Path, keys: tuple[str, ...]) -> l
     Raises:
         NoVideo: A file could not be opened, or is not complete.
     """
-    commanders = Commanders()
+    commanders = Commanders(recording.messages(TOLD_IN, newest_first=True))
     videos: dict[str, _Video] = {}
     try:
         for message in recording.messages():

@@ -54,8 +54,6 @@ def test_a_person_is_named_by_name_a_behavior_by_its_own_and_nobody_is_empty():
     commanders.take(said("Schedule/1", {"requests": requests}))
     commanders.take(said("ComponentState/2", {"address": "ui_console/console-1", "user": "anna"}))
     assert [commanders.of(one) for one in (of_anna, of_watch, of_none)] == ["anna", "watch", ""]
-    commanders.take(said("Schedule/1", {"requests": []}))
-    assert commanders.of(of_anna) == ""
 
 
 def test_a_message_without_an_arc_is_of_the_arc_of_its_epoch():
@@ -65,6 +63,26 @@ def test_a_message_without_an_arc_is_of_the_arc_of_its_epoch():
     commanders.take(said("Connect/1", {"arc": "watch-capture", "epoch": 7}, asked))
     applied = [said("Applied/1", {"rc": rc, "epoch": epoch}, motions) for rc, epoch in (("scout1", 7), ("scout1", 6))]
     assert [commanders.of(one) for one in applied] == ["watch", ""]
+
+
+def test_an_arc_that_was_connected_before_the_recording_is_known_by_the_schedule():
+    commanders = Commanders()
+    holders = [{"arc": "watch-capture", "epoch": 7}]
+    requests = [{"arc": "watch-capture", "owner": "mission_control/watch"}]
+    commanders.take(said("Schedule/1", {"rcs": [{"rc": "scout1", "holders": holders}], "requests": requests}))
+    assert commanders.of(said("Applied/1", {"rc": "scout1", "epoch": 7})) == "watch"
+
+
+def test_what_is_told_later_is_known_from_the_first_message_on():
+    applied = said("Applied/1", {"rc": "scout1", "epoch": 7})
+    told = [
+        applied,
+        said("Connect/1", {"arc": "anna-drive", "epoch": 7}, "scout/night/resource_pool/scout1/ask"),
+        said("Schedule/1", {"requests": [{"arc": "anna-drive", "owner": "ui_console/console-1"}]}),
+        said("ComponentState/2", {"address": "ui_console/console-1", "user": "anna"}),
+        said("Schedule/1", {"requests": [{"arc": "anna-drive", "owner": "mission_control/later"}]}),
+    ]
+    assert Commanders(reversed(told)).of(applied) == "anna"
 
 
 @given(body=st.dictionaries(st.sampled_from(["arc", "rc", "epoch"]), leaves | st.lists(leaves) | st.just({"x": 1})))
