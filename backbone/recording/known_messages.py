@@ -2,13 +2,14 @@
 
 A package lists its modules with messages as entry points of the group ``scout_backbone.messages``; a kind of RC may
 define its commands in the module of its class. Messages of all other classes are recorded without the names of
-their fields.
+their fields, also those of a class of one's own whose name an installed package or another module has taken.
 """
 
 from __future__ import annotations
 
 import importlib
 import logging
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from importlib.metadata import entry_points
 
@@ -28,14 +29,30 @@ def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
         modules: Further modules, such as those of the mission's component types; a module that cannot be imported here
             is skipped.
     """
+    packages: set[str] = set()
     for entry in entry_points(group=GROUP):
         entry.load()
+        packages.add(entry.module.partition(".")[0])
     for module in modules:
         try:
             importlib.import_module(module)
         except Exception as error:  # a module that is being written raises anything
             log.warning("messages of %s are recorded without names: %s: %s", module, type(error).__name__, error)
-    return {schema_of(kind): kind for kind in _derived(Message)}
+    named: dict[str, dict[str, type[Message]]] = defaultdict(dict)
+    for kind in _derived(Message):
+        named[schema_of(kind)][f"{kind.__module__}:{kind.__qualname__}"] = kind
+    known: dict[str, type[Message]] = {}
+    for schema, kinds in named.items():
+        installed = [path for path in kinds if path.partition(".")[0] in packages]
+        only = installed or list(kinds)
+        if len(only) == 1:  # else the names of one class would stand beside the values of the other
+            known[schema] = kinds[only[0]]
+        if len(kinds) > 1:
+            nameless = " and ".join(sorted(path for path, kind in kinds.items() if known.get(schema) is not kind))
+            log.warning(
+                "messages of %s are recorded without names: rename a class, as %s stands twice", nameless, schema
+            )
+    return known
 
 
 def _derived(kind: type[Message]) -> Iterator[type[Message]]:

@@ -20,6 +20,8 @@ LINE_PX = 24  # chosen: a line of text below the picture
 TEXT_SCALE = 0.4  # chosen: forty letters fit a picture of 320 pixels
 MIN_WIDTH_PX = 320
 FRAMES = "Frame/"
+PICTURE = {"pixels", "width_px", "height_px", "robot"}
+"""Fields that a picture has; a module's own message may have its name."""
 
 
 class NoVideo(Refusal):
@@ -40,7 +42,7 @@ def write_videos(recording: Recording, folder: Path, keys: tuple[str, ...]) -> l
     try:
         for message in recording.messages():
             commanders.take(message)
-            if not message.schema.startswith(FRAMES) or (keys and not is_meant(message.key, keys)):
+            if not _is_picture(message) or (keys and not is_meant(message.key, keys)):
                 continue
             name = "_".join(message.key.split("/")[2:])
             if name not in videos:
@@ -98,6 +100,11 @@ class _Video:
         written.release()
         if count < self._added:
             raise NoVideo(f"{self.path} lacks pictures", remedy="Free disc space, and export again.")
+
+
+def _is_picture(message: Recorded) -> bool:
+    body = message.body
+    return message.schema.startswith(FRAMES) and isinstance(body, dict) and body.keys() >= PICTURE
 
 
 def _picture(message: Recorded) -> NDArray[np.uint8]:

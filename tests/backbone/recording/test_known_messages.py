@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+import sys
 from pathlib import Path
 
 import pytest
 
 from backbone.recording.known_messages import message_classes
+from resource_pool.messages import Frame
 
 
 @pytest.mark.parametrize(
@@ -22,3 +24,20 @@ def test_a_module_that_cannot_be_imported_is_skipped_and_logged(
     with caplog.at_level(logging.WARNING):
         assert message_classes(["module_in_work"]) == message_classes()
     assert "messages of module_in_work are recorded without names" in caplog.text
+
+
+def test_a_class_of_ones_own_takes_no_name_from_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    for name, classes in {"a_box": ["Frame", "BoxFound"], "b_box": ["BoxFound", "BoxLost"]}.items():
+        lines = [f"class {kind}(Message, frozen=True):\n    {name}_m: float" for kind in classes]
+        (tmp_path / f"{name}.py").write_text("\n".join(["from backbone.wire import Message", *lines]))
+    monkeypatch.syspath_prepend(tmp_path)
+    with caplog.at_level(logging.WARNING):
+        found = message_classes(["a_box", "b_box"])
+    del sys.modules["a_box"], sys.modules["b_box"]
+    assert found["Frame/1"] is Frame
+    assert "BoxFound/1" not in found
+    assert found["BoxLost/1"].__module__ == "b_box"
+    assert "messages of a_box:Frame are recorded without names" in caplog.text
+    assert "messages of a_box:BoxFound and b_box:BoxFound are recorded without names" in caplog.text
