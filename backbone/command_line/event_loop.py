@@ -11,6 +11,7 @@ import uvloop
 
 from backbone.errors import BackboneError
 from backbone.launcher.endings import complaint_of, say
+from backbone.operating_system.ending_signals import orders_to_end
 
 
 def exit_code_of(work: Callable[[], Awaitable[int]]) -> int:
@@ -30,16 +31,17 @@ def exit_code_of(work: Callable[[], Awaitable[int]]) -> int:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Let Ctrl-C end the block at once, although it awaits nothing.
+    """Let Ctrl-C, SIGTERM and a closed terminal end the block at once and in good order, although it awaits nothing.
 
-    By default Ctrl-C only cancels the coroutine, which notices that when it awaits, and so after its work.
+    By default Ctrl-C only cancels the coroutine, which notices that when it awaits, and so after its work; the others
+    end the process where it is, and half a file would stay.
     """
-    before = signal.getsignal(signal.SIGINT)
-    if not callable(before):  # ignored, as in the background of a shell
-        yield
-        return
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *orders_to_end())}
+    heeded = [number for number, handler in before.items() if handler is not signal.SIG_IGN]  # as a shell's background
+    for number in heeded:
+        signal.signal(number, signal.default_int_handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number in heeded:
+            signal.signal(number, before[number])

@@ -15,6 +15,7 @@ from mcap.writer import Writer
 from small_recordings import SCOUT, Said, recorded
 
 from backbone.command_line import comparing, event_loop, exporting, foxglove_copy, joining, recording_work, replaying
+from backbone.command_line.unusable_file import new_folder
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
@@ -95,6 +96,20 @@ def test_it_ends_at_once_and_leaves_nothing(
 def test_a_component_that_hangs_in_a_rerun_holds_up_no_ctrl_c(night: Path) -> None:
     done = subprocess.run([sys.executable, "-c", HANGS, str(night)], timeout=30, check=False, capture_output=True)
     assert done.returncode == -signal.SIGINT, done.stderr
+
+
+@pytest.mark.parametrize("order", [signal.SIGTERM, signal.SIGHUP])
+def test_an_order_to_end_leaves_nothing_half_written(order: signal.Signals, tmp_path: Path) -> None:
+    def write() -> None:
+        with event_loop.interruptible(), new_folder(tmp_path / "new"):
+            assert signal.getsignal(order) is not signal.SIG_DFL  # else the order would end this test run
+            signal.raise_signal(order)
+
+    before = signal.getsignal(order)
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert not (tmp_path / "new").exists()
+    assert signal.getsignal(order) is before
 
 
 def test_where_a_shell_ignores_ctrl_c_it_stays_ignored() -> None:
