@@ -85,7 +85,10 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
                 whole.take(record)
     except DAMAGED as error:
         if not has_begun:
-            raise NoRecording(f"no recording: {str(error) or 'it is too short'}") from error
+            why = str(error) or "it is too short"
+            raise NoRecording(
+                f"no recording: {why}", remedy="Name a recording; this file has nothing of one."
+            ) from error
     whole.finish()
     return Recovered(whole.messages, lost)
 

@@ -129,8 +129,9 @@ def test_what_is_no_recording_is_refused_with_a_remedy(data: bytes) -> None:
     with pytest.raises(NoRecording) as refused:
         Recording(io.BytesIO(data))
     assert "recover" in refused.value.remedy
-    with pytest.raises(NoRecording):
+    with pytest.raises(NoRecording) as refused:
         recover(io.BytesIO(data), io.BytesIO())
+    assert "recover" not in refused.value.remedy
 
 
 def test_an_unfinished_recording_names_the_remedy_and_recovers(tmp_path: Path) -> None:
