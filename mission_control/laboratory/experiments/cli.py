@@ -11,6 +11,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from backbone.command_line.options import CommandTable
+from backbone.command_line.unusable_file import FileUnusable
 from backbone.errors import Refusal, code_of
 from backbone.launcher.endings import ExitCode
 
@@ -55,7 +56,7 @@ Seed = Annotated[int, typer.Option("--seed", min=0, max=LARGEST_SEED, help="The 
 Jobs = Annotated[int, typer.Option("--jobs", min=0, max=MOST_JOBS, help="Processes; 0: one a core.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 PlotTo = Annotated[Path | None, typer.Option("--plot", help="Write a picture of the rates, PNG or SVG.")]
-TracesTo = Annotated[Path | None, typer.Option("--traces", help="Folder for the schedule trace of each trial.")]
+TracesTo = Annotated[Path | None, typer.Option("--traces", help="New folder for the schedule trace of each trial.")]
 
 
 @app.callback()
@@ -191,6 +192,8 @@ def _run(
             plot.parent.mkdir(parents=True, exist_ok=True)
         if traces is not None:
             traces.mkdir(parents=True, exist_ok=True)
+            if any(traces.iterdir()):  # traces of another run would stand among these
+                raise FileUnusable(f"{traces} is not empty", remedy="Name a new folder.")
         with progress_bar(Console(stderr=True), "trials") as progress:
             outcome = run_surveillance(
                 conditions, trials=trials, seed=seed, jobs=jobs, progress=progress, traces=traces

@@ -114,3 +114,10 @@ def test_a_picture_gets_the_folder_that_it_names(tmp_path: Path) -> None:
     told = surveillance("--extra", "0", "--noise", "0", "--trials", "1", "--plot", str(file))
     assert told.exit_code == 0, told.output
     assert file.exists()
+
+
+def test_traces_do_not_go_among_those_of_another_run(tmp_path: Path) -> None:
+    (tmp_path / "00-0001.jsonl").touch()
+    told = surveillance("--extra", "0", "--trials", "1", "--traces", str(tmp_path))
+    assert told.exit_code == 2
+    assert "is not empty (Name a new folder.)" in told.output
