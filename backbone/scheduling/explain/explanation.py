@@ -7,14 +7,14 @@ if no event comes in between.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from backbone.naming import component_of
 from backbone.scheduling.entries import INSTANT_S, ArcEntry, RcEntry
 from backbone.scheduling.explain.blockers import Blockers
 from backbone.scheduling.explain.packet_lines import packet_lines
-from backbone.scheduling.explain.start_prediction import StartPrediction
+from backbone.scheduling.explain.start_prediction import Foreseen, StartPrediction
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.planner import Slot
 from backbone.scheduling.priority import higher
@@ -24,7 +24,7 @@ from backbone.scheduling.views import RcView, RequestView, Schedule, Why
 from backbone.spoken import counted
 
 UNKNOWN_S = -1.0
-MOST_REHEARSED = 32  # measured: a rehearsal of so many takes at most 80 ms
+MOST_REHEARSED = 32  # chosen: so many are played forward over at least some thirty slices
 
 _REASONS = {
     "slice": "its slice was over and it was the turn of {by}",
@@ -50,17 +50,20 @@ class Explanation:
     """Answers about one master schedule."""
 
     def __init__(
-        self, schedule: MasterSchedule, rules: SchedulingRules, granted_s: Callable[[ArcEntry, float], float]
+        self,
+        schedule: MasterSchedule,
+        rules: SchedulingRules,
+        foresee: Callable[[Collection[ArcEntry], float], Foreseen],
     ) -> None:
         """Explain this schedule.
 
         Args:
             schedule: The schedule; nothing in it changes.
             rules: Rules of the decisions.
-            granted_s: Returns when a waiting ARC is granted, by playing the schedule forward; arguments: ARC, time of
-                the question; infinite: not foreseeable.
+            foresee: Plays the schedule forward until these waiting ARCs are granted; arguments: ARCs, time of the
+                question.
         """
-        self._granted_s = granted_s
+        self._foresee = foresee
         self._schedule = schedule
         self._table = schedule.table
         self._state = schedule.state
@@ -150,8 +153,7 @@ class Explanation:
             UnknownRequest: No ARC, owner or RC has this name.
         """
         if name in self._state.arcs:
-            arc = self._state.arcs[name]
-            return self._why_arc(arc, now_s)
+            return self._why_arcs([self._state.arcs[name]], now_s)[0]
         owned = [
             arc for arc in self._state.arcs.values() if name in (arc.request.owner, component_of(arc.request.owner))
         ]
@@ -163,7 +165,7 @@ class Explanation:
 
     def _why_owner(self, name: str, owned: Sequence[ArcEntry], now_s: float) -> Why:
         """Return the reasons for all its ARCs; state and rule are those of the ARC that waits longest."""
-        answers = [self._why_arc(arc, now_s) for arc in owned]
+        answers = self._why_arcs(owned, now_s)
         first = min(answers, key=lambda why: (why.state != RequestState.WAITING, why.name))
         return Why(
             name=name,
@@ -205,10 +207,18 @@ class Explanation:
             would_change=_what_brings_back(rc) if not rc.up else "a request, or the end of one, that names it",
         )
 
-    def _why_arc(self, arc: ArcEntry, now_s: float) -> Why:
-        slot, granted_s = self._place(arc, now_s)
-        if slot is not None and len(self._state.arcs) <= MOST_REHEARSED:
-            granted_s = self._granted_s(arc, now_s)
+    def _why_arcs(self, arcs: Sequence[ArcEntry], now_s: float) -> list[Why]:
+        places = {arc: self._place(arc, now_s) for arc in arcs}
+        grants_s = self._grants_s({arc: granted_s for arc, (_, granted_s) in places.items() if arc.queued}, now_s)
+        return [self._why_arc(arc, slot, grants_s.get(arc, math.inf), now_s) for arc, (slot, _) in places.items()]
+
+    def _grants_s(self, planned_s: Mapping[ArcEntry, float], now_s: float) -> Mapping[ArcEntry, float]:
+        """Return the grants of queued ARCs as foreseen; beyond that, or of many ARCs, as planned."""
+        if not planned_s or len(self._state.arcs) > MOST_REHEARSED:
+            return planned_s
+        return self._foresee(planned_s.keys(), now_s).or_planned(planned_s)
+
+    def _why_arc(self, arc: ArcEntry, slot: Slot | None, granted_s: float, now_s: float) -> Why:
         blockers = self._blockers.direct(slot, now_s) if slot is not None else []
         answer = self._answer(arc, slot, blockers, granted_s, now_s)
         lines, would_change = [*answer.lines], answer.would_change

@@ -9,7 +9,8 @@ Rule of this file: it predicts and decides nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
 from backbone.scheduling.master_schedule import MasterSchedule
@@ -18,6 +19,23 @@ from backbone.scheduling.prefix_maximum import PrefixMaximum
 from backbone.scheduling.priority import higher
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.rules import SchedulingRules
+
+
+class Foreseen(NamedTuple):
+    """The schedule played forward.
+
+    Attributes:
+        grants_s: ARC → time of its next grant.
+        until_s: End of the played time.
+    """
+
+    grants_s: Mapping[str, float]
+    until_s: float
+
+    def or_planned(self, planned_s: Mapping[ArcEntry, float]) -> dict[ArcEntry, float]:
+        """Return the grants of these ARCs as foreseen, or as planned if that is after the played time."""
+        later_s = {arc: time_s if time_s > self.until_s else math.inf for arc, time_s in planned_s.items()}
+        return {arc: self.grants_s.get(arc.name, time_s) for arc, time_s in later_s.items()}
 
 
 class StartPrediction:
