@@ -180,8 +180,11 @@ class Explanation:
     def _why_rc(self, rc: RcEntry, now_s: float) -> Why:
         users = [arc for arc in self._state.arcs.values() if rc.name in arc.uses]
         holders = [arc for arc in users if arc.holds]
-        waiting = [(arc, self._place(arc, now_s)[1]) for arc in users if arc.queued]
-        coming = sorted(waiting, key=lambda item: item[1])
+        groups = [group for group in self._state.in_groups() if any(rc.name in arc.uses for arc in group)]
+        slots = [self._schedule.slots(group, now_s) for group in groups]
+        planned_s = [item for places in slots for item in self._prediction.grants_s(places, now_s).items()]
+        grants_s = self._grants_s({arc: time_s for arc, time_s in planned_s if rc.name in arc.uses}, now_s)
+        coming = sorted(grants_s.items(), key=lambda item: item[1])
         lines = [f"{rc.name} is {'up' if rc.up else 'down' if rc.failed else 'not started'}"]
         if rc.fault:
             lines = [f"{rc.name} is put aside: {rc.fault}"]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from random import Random
 
 import pytest
 from simulated_switches import Bench, ask, load, manager, sharable, states, unit
 
+from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.events import Event, Instruction
 from backbone.scheduling.requests import RcUse, RequestState
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.table import Table
 
 NOW_S = 20.0
 MOST_DECISIONS = 250  # measured: 0.1 s for 32 ARCs; leases last 2 s
@@ -43,6 +46,17 @@ def test_the_last_of_twelve_equals_hears_of_its_turn_after_many_minutes(run_s: f
     assert "no gap" not in why.lines[0]
 
 
+def test_what_why_says_of_an_rc_it_says_of_each_arc_that_waits_for_it() -> None:
+    bench = mesh(24)
+    lines = bench.answers.why("radio", NOW_S).lines
+    whys = [bench.answers.why(arc, NOW_S) for arc in waiting(bench)]
+    assert whys
+    for why in whys:
+        told = f"gets it at about {why.expected_start_s:.2f} s"
+        expected = told if why.expected_start_s >= 0 else "waits for it without a predicted time"
+        assert f"{why.name} {expected}" in lines
+
+
 def test_foresight_ends_after_few_decisions(monkeypatch: pytest.MonkeyPatch) -> None:
     """One question about 32 ARCs took up to 1 s, during which no lease was renewed."""
     bench = mesh(32)
@@ -61,3 +75,19 @@ def test_foresight_ends_after_few_decisions(monkeypatch: pytest.MonkeyPatch) -> 
         decisions = 0
         bench.answers.why(arc, NOW_S)
         assert decisions <= MOST_DECISIONS
+
+
+def test_the_group_of_an_rc_is_put_in_order_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was put in order for each ARC that waits for the RC: ``why`` took seconds, and holders lost their leases."""
+    bench = mesh(66)
+    times = 0
+    in_order = Table.in_order
+
+    def counted(self: Table, arcs: Sequence[ArcEntry]) -> list[ArcEntry]:
+        nonlocal times
+        times += 1
+        return in_order(self, arcs)
+
+    monkeypatch.setattr(Table, "in_order", counted)
+    bench.answers.why("radio", NOW_S)
+    assert times == 1
