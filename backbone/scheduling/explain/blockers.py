@@ -45,6 +45,8 @@ class Blockers:
         """
         arc, planner = slot.arc, self._schedule.planner_of(slot.arc)
         met = [*dict.fromkeys(other for other, _, _ in meeting(slot.against, now_s, now_s + arc.length_s))]
+        if not self._in_turns:
+            met += [one for one in self._holders_in_the_way(arc, now_s) if one.state in CONNECTED and one not in met]
         met += [first for first in planner.firsts_before(arc) if first not in met]
         alone = [other for other in met if not self._table.fits(arc, [other])]
         if not met and self._table.strict:

@@ -133,6 +133,17 @@ def test_under_the_discipline_time_equals_that_ask_for_the_same_take_turns(jitte
         assert max(end_s - start_s for start_s, end_s in bench.runs(arc) if end_s) < 2.6
 
 
+def test_an_equal_that_runs_on_under_the_discipline_time_is_named():
+    """Its resource was said to be coming free."""
+    bench = Bench(manager(discipline="time"), unit("v"))
+    bench.tell(ask("long", "v", run_s=8.0))
+    bench.tell(ask("short", "v", run_s=1.0))
+    bench.run(10.5)
+    assert bench.runs("short") == [(8.0, None)]
+    for because in (bench.answers.why("long", 10.5).lines[0], bench.answers.schedule(10.5).requests[0].because):
+        assert "for short, granted at about" in because
+
+
 def test_slices_end_on_the_grid():
     bench = Bench(manager(grid_s=4.0), unit("v"), unit("w"))
     bench.at(0.5, ask("a", "v", run_s=3.0))
