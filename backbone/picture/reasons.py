@@ -31,6 +31,8 @@ from backbone.wire import Message, plain
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long
 
+SHOWN_S = 0.05  # chosen: a shorter time is shown as 0.0 s
+
 
 @dataclass(frozen=True)
 class Reasons:
@@ -72,7 +74,7 @@ class Reasons:
         if self.why is not None:
             lines += [f"{self.name}: {self.why.state}", *(f"  {line}" for line in self.why.lines)]
             if self.why.expected_start_s >= 0:
-                lines.append(f"  expected to start in {max(0.0, self.why.expected_start_s - now_s):.1f} s")
+                lines.append(f"  {_start_text(self.why, now_s)}")
             if self.why.would_change:
                 changes = "it starts as soon as" if self.why.state == RequestState.WAITING else "this changes when"
                 lines.append(f"  {changes} {self.why.would_change}")
@@ -102,6 +104,12 @@ class Reasons:
             "led_to": [event_json(event) for event in self.led_to],
             "remarks": list(self.remarks),
         }
+
+
+def _start_text(why: Why, now_s: float) -> str:
+    in_s = why.expected_start_s - now_s
+    what = "expected to start" if why.state in list(RequestState) else "next grant expected"
+    return f"{what} in {in_s:.1f} s" if in_s >= SHOWN_S else f"{what} now"
 
 
 @dataclass(frozen=True)

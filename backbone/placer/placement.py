@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 from backbone.naming import did_you_mean
 from backbone.placer.messages import NoHost
+from backbone.spoken import counted
 
 BUSY_AS_COMPONENTS = 8.0  # chosen: on a saturated host one more component costs like eight on an idle one
 BUSY_STEPS = 4  # chosen: quarters; below an eighth a processor counts as idle, so that noise does not steer
@@ -55,7 +56,7 @@ class CandidateHost:
     def describe(self) -> str:
         """Return its load in words."""
         return (
-            f"{self.components} components on {self.cores} cores, "
+            f"{counted(self.components, 'component')} on {counted(self.cores, 'core')}, "
             f"processor {self.cpu:.0%} and memory {self.memory:.0%} in use"
         )
 

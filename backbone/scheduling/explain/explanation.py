@@ -207,7 +207,7 @@ class Explanation:
             rule="11" if not rc.up else "3",
             blockers=[arc.name for arc in holders],
             expected_start_s=next((granted_s for _, granted_s in coming if granted_s < math.inf), UNKNOWN_S),
-            would_change=_what_brings_back(rc) if not rc.up else "a request, or the end of one, that names it",
+            would_change=_what_brings_back(rc) if not rc.up else "an ARC asks for it, releases it or idles",
         )
 
     def _why_arcs(self, arcs: Sequence[ArcEntry], now_s: float) -> list[Why]:
@@ -256,7 +256,8 @@ class Explanation:
                 return self._runs(arc, now_s)
             case RequestState.CONNECTING:
                 settled_s = arc.began_s + arc.settle_s
-                what = f"its RCs are being connected since {_at(arc.began_s)}, settled at {_at(settled_s)}"
+                due = "settled at" if settled_s >= now_s - INSTANT_S else "overdue since"
+                what = f"its RCs are being connected since {_at(arc.began_s)}, {due} {_at(settled_s)}"
                 return _Answer([what], "6", "its RCs settle, or a higher ARC asks")
             case RequestState.REVOKING:
                 what = f"its RCs are being disconnected since {_at(arc.since_s)}: {_reason(arc)}"

@@ -23,6 +23,7 @@ from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.picture.reasons import AskedName, FoundEvents, Reasons, reasons_for, story_of
+from backbone.scheduling.views import Why
 
 CAUSE = "backbone/rc_manager#112"
 SCOUT = ComponentState(
@@ -129,6 +130,20 @@ def test_why_shows_a_standing_stop_and_an_absence() -> None:
 def test_while_the_rc_manager_is_silent_no_name_is_called_unknown() -> None:
     with pytest.raises(LinkError):
         why("nobody")
+
+
+@pytest.mark.parametrize(
+    ("state", "at_s", "line"),
+    [
+        ("waiting", 5.0, "  expected to start in 3.0 s"),
+        ("held", 5.0, "  next grant expected in 3.0 s"),
+        ("connecting", 9.0, "  expected to start now"),
+    ],
+)
+def test_a_predicted_start_is_told_for_arcs_and_resources(state: str, at_s: float, line: str) -> None:
+    """A resource was said to start, and a late one in 0.0 s."""
+    known = Why("scout1", state, ["as it is"], "3", [], 8.0, "")
+    assert line in Reasons("scout1", known, None, None).lines(at_s)
 
 
 def test_a_story_book_finds_what_a_message_led_to() -> None:

@@ -131,5 +131,9 @@ def test_a_host_that_does_not_exist_is_answered_with_the_nearest_one() -> None:
         place("world", [], "", [])
 
 
+def test_one_component_on_one_core_is_told_in_the_singular() -> None:
+    assert CandidateHost("base", components=1).describe().startswith("1 component on 1 core, ")
+
+
 def test_a_host_without_obstacle_is_told_by_nothing() -> None:
     assert obstacle(CandidateHost("alpha"), [], "") == ""

@@ -82,6 +82,14 @@ def test_why_has_an_answer_in_every_state():
     assert "again at" in bench.answers.why("f", 9.0).lines[0]
 
 
+def test_an_rc_that_settles_late_is_overdue():
+    """It was said to have settled at the planned time."""
+    bench = Bench(manager(), unit("v", connect_s=1.0), delay_s=lambda: 3.0)
+    bench.tell(ask("a", "v"))
+    assert "settled at 1.00 s" in bench.answers.why("a", 0.5).lines[0]
+    assert "overdue since 1.00 s" in bench.answers.why("a", 2.0).lines[0]
+
+
 def test_the_schedule_shows_holders_and_who_is_next():
     bench = Bench(manager(), unit("v"))
     bench.tell(ask("a", "v"))
