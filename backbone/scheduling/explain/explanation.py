@@ -166,7 +166,8 @@ class Explanation:
     def _why_owner(self, name: str, owned: Sequence[ArcEntry], now_s: float) -> Why:
         """Return the reasons for all its ARCs; state and rule are those of the ARC that waits longest."""
         answers = self._why_arcs(owned, now_s)
-        first = min(answers, key=lambda why: (why.state != RequestState.WAITING, why.name))
+        longest = min(owned, key=lambda arc: (arc.state is not RequestState.WAITING, arc.since_s))
+        first = answers[owned.index(longest)]
         return Why(
             name=name,
             state=first.state,

@@ -66,6 +66,17 @@ def test_why_knows_owners_by_name_and_address_and_rcs():
         bench.answers.scheduled("nobody", 1.0)
 
 
+def test_why_of_an_owner_is_about_its_arc_that_waits_longest():
+    """It was about the first by name."""
+    bench = Bench(manager(), unit("v"), unit("w"))
+    for rc in "vw":
+        bench.tell(ask(f"holder-{rc}", rc, priority=2))
+    bench.tell(ask("z", "v", path=[("watch", 0), ("tour", 1)]))
+    bench.run(1.0)
+    bench.tell(ask("a", "w", path=[("watch", 0), ("tour", 1)]))
+    assert bench.answers.why("tour", 2.0).blockers == ["holder-v"]
+
+
 def test_why_has_an_answer_in_every_state():
     bench = Bench(manager(), unit("v", connect_s=1.0, disconnect_s=1.0), unit("down", up=False))
     bench.fails["f"] = ""
