@@ -300,11 +300,12 @@ class Explanation:
     def _starves(self, arc: ArcEntry, blockers: Sequence[ArcEntry], what: str) -> _Answer:
         lasting = (RequestState.CONNECTING, RequestState.RUNNING)
         stay = [other for other in blockers if other.state in lasting and higher(other.path, arc.path)]
+        risen = f", unless {arc.name} rises meanwhile (aging)" if self._rules.aging_s else ""
         if not stay:
             remedy = f"{_release(blockers)}, or a shorter minimum run time"
-            return _Answer([f"{what}: no gap is long enough for it"], "9", remedy)
+            return _Answer([f"{what}: no gap is long enough for it{risen}"], "9", remedy)
         until = "stays until it releases or idles" if len(stay) == 1 else "stay until they release or idle"
-        return _Answer([f"{what}: {_names(stay)}, higher, {until}"], "9", _release(blockers))
+        return _Answer([f"{what}: {_names(stay)}, higher, {until}{risen}"], "9", _release(blockers))
 
     def _would_let_it_start(self, arc: ArcEntry, blockers: Sequence[ArcEntry], otherwise: str) -> str:
         """Return the events after which the ARC would start after one hand-over."""

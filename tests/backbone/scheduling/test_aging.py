@@ -7,6 +7,17 @@ from simulated_switches import Bench, ask, manager, unit
 from backbone.scheduling.events import Departed, Idled
 
 
+def test_the_schedule_does_not_call_a_wait_endless_that_aging_ends():
+    """``why`` named the time of the grant, and the schedule said that the higher ARC stays until it idles."""
+    bench = Bench(manager(aging_s=4.0), unit("v"))
+    bench.tell(ask("guard", "v", priority=3))
+    bench.tell(ask("tour", "v", priority=1))
+    bench.run(5.0)
+    tour = next(one for one in bench.answers.schedule(5.0).requests if one.arc == "tour")
+    assert tour.expected_start_s < 0
+    assert tour.because.endswith("guard, higher, stays until it releases or idles, unless tour rises meanwhile (aging)")
+
+
 def test_with_aging_a_lower_one_that_waited_long_gets_one_whole_slice():
     """After 10 s it is as high as the other, whose slice is over."""
     bench = Bench(manager(aging_s=10.0), unit("v"))
