@@ -279,9 +279,10 @@ class Explanation:
             return _Answer([reason], "11", f"{', '.join(down)} answers")
         if slot is None or not self._table.usable(arc):
             crowded = ", ".join(rc for rc in arc.uses if self._state.rcs[rc].sharable)
-            return _Answer(
-                [f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows"
-            )
+            until = f"the capacity of {crowded} grows"
+            if packet_lines(arc):  # measured times are forgotten when the ARC ends
+                until = f"its owner claims anew, with a longer period or once {crowded} is faster"
+            return _Answer([f"{age}: {crowded} could not serve it even alone"], "11", until)
         if not blockers:
             return _Answer([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
         whom = _names(blockers)

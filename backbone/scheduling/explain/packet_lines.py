@@ -20,5 +20,5 @@ def _lines(arc: ArcEntry) -> Iterator[str]:
             takes_s = arc.measured[rc][number].packet_us / 1e6
             if takes_s > usage.packet_time_s:
                 what = f"its {usage.kind} packets" if usage.kind else "its packets"
-                times = f"on {rc} take {takes_s * 1e3:.3g} ms, it declared {usage.packet_time_s * 1e3:.3g}"
+                times = f"on {rc} take {takes_s * 1e3:g} ms, it declared {usage.packet_time_s * 1e3:g}"
                 yield f"{what} {times}: {counts if arc.understates else 'the longer time counts'}"

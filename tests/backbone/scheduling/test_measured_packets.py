@@ -221,6 +221,21 @@ def test_who_does_not_fit_even_alone_waits_and_others_run():
     assert bench.verdict() == []
 
 
+def test_who_does_not_fit_even_alone_runs_once_it_is_claimed_anew_as_why_says():
+    bench = Bench(manager(), sharable("r"))
+    bench.tell(ask("a", {"r": load(0.4)}))
+    bench.at(1.0, measured("a", 2.0))
+    bench.at(2.0, CapacityChanged("r", 1.0))
+    bench.run(10.0)
+    why = bench.answers.why("a", 10.0)
+    assert why.would_change == "its owner claims anew, with a longer period or once r is faster"
+    assert any("take 2000 ms" in line for line in why.lines)
+    bench.tell(Departed("a"))
+    bench.tell(ask("a", {"r": load(0.4)}))
+    bench.run(20.0)
+    assert bench.runs("a") == [(0.0, 1.0), (10.0, None)]
+
+
 # ---------------------------------------------------------------------- laws
 class Watched:
     """A schedule manager of which is worked out after each event, from outside, whether all packets are in time."""
