@@ -44,6 +44,7 @@ log = logging.getLogger(__name__)
 
 OPENS_AGAIN_WITHIN_S = 20.0  # chosen: as a component has to become ready; machine seconds
 CLOSES_WITHIN_S = 2.0  # chosen: a device that does not close by then hangs; machine seconds
+RESTORES_WITHIN_S = 2.0  # chosen: as for a close, from the time on at which only one driver is left; machine seconds
 
 
 class RcOfDrivers(Protocol):
@@ -181,7 +182,7 @@ class DriverExchanges:
         try:
             remark = await self._over(going)
         finally:
-            await asyncio.gather(bringing_up)
+            await self._within(bringing_up, going)
         if going.course.phase is ExchangePhase.RETURNED:
             anew.undo()
         return going.course.answer(self._now_s(), remark)
@@ -268,8 +269,17 @@ class DriverExchanges:
         try:
             await self._rc.driver_exchanged()
         except HardwareFault as fault:
-            if going.slot.works is going.old:
+            if going.slot.works is going.old or going.course.phase is ExchangePhase.PROVED:
                 self._rc.fail(fault)
+
+    async def _within(self, restoring: Awaitable[None], going: _DriverExchange) -> None:
+        """Wait until the state is restored; a driver that hangs ends the RC, whose creator starts it again."""
+        try:
+            async with asyncio.timeout(RESTORES_WITHIN_S):
+                await restoring
+        except TimeoutError:
+            hung = f"{class_path_of(going.slot.works)} did not restore its state within {RESTORES_WITHIN_S:g} s"
+            self._rc.fail(HardwareFault(f"{self._rc.name}: {hung}"))
 
     async def _returned(self, going: _DriverExchange) -> str:
         if not going.is_beside:
@@ -284,7 +294,7 @@ class DriverExchanges:
         old, new = class_path_of(going.old), going.asked.class_path
         self._tell(going.course.outcome(old, new), LogLevel.WARNING)
         if going.course.switched_s is not None or not going.is_beside:
-            await self._restored(going)
+            await self._within(self._restored(going), going)
         if going.is_beside:
             await self._close(going.new)
         return remark_on_file(self._rc.name, old, new)

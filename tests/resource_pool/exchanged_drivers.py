@@ -22,6 +22,8 @@ class First:
 
     async def set_brightness(self, share: float) -> None:
         self.count += 1
+        if Bench.fault == "stuck":
+            await asyncio.Event().wait()
         await asyncio.sleep(0.01)
         Bench.shone.append((self.who, share))
 

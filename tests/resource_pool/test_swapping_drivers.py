@@ -178,6 +178,38 @@ def the_pool_is_read_anew() -> Iterator[None]:
         sys.modules["pool_on_local_network"] = mine
 
 
+@pytest.mark.parametrize("fault", ["call", "hang"])
+@pytest.mark.parametrize(("old", "new"), PAIRS)
+def test_a_driver_without_a_trial_that_cannot_restore_the_state_ends_the_rc(
+    local_mission: Any, old: str, new: str, fault: str
+) -> None:
+    """Otherwise a fault is silent, and a hang refuses each further exchange, also that to a driver that works."""
+
+    async def scene(pool: Pool) -> None:
+        Bench.fault = fault
+        swapping = asyncio.create_task(swap(pool, new, prove_s=0.0))
+        await pool.clock.sleep_s(10.0)
+        assert not pool.is_alive("lamp1")
+        assert isinstance(await pool.outcome("lamp1"), HardwareFault)
+        await asyncio.gather(swapping, return_exceptions=True)
+
+    bench(local_mission, old, scene)
+
+
+def test_an_old_driver_that_hangs_when_its_state_is_restored_ends_the_rc(local_mission: Any) -> None:
+    async def scene(pool: Pool) -> None:
+        Bench.fault = "stuck"
+        swapping = asyncio.create_task(swap(pool, "Second"))
+        await pool.clock.sleep_s(10.0)
+        assert not pool.is_alive("lamp1")
+        bug = await pool.outcome("lamp1")
+        assert isinstance(bug, HardwareFault)
+        assert "First did not restore" in str(bug)
+        await asyncio.gather(swapping, return_exceptions=True)
+
+    bench(local_mission, "First", scene)
+
+
 EVENTS = st.lists(
     st.tuples(st.sampled_from(["shine", "connect", "disconnect", "swap"]), st.sampled_from(["", *FAULTS])), max_size=10
 )
