@@ -210,8 +210,8 @@ def decode_reply(payload: bytes) -> RoverReply:
 
 
 def _milli(number: float) -> int:
-    if not math.isfinite(number):
-        raise MalformedPacket(f"{number} is not finite")
+    if not math.isfinite(number * _MILLI):
+        raise MalformedPacket(f"{number} is not finite, or too large")
     return round(number * _MILLI)
 
 

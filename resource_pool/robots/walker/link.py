@@ -93,7 +93,7 @@ def encode_status(status: Status) -> bytes:
         raise MalformedPacket(f"{len(status.on_floor)} feet, not {len(LEGS)}")
     tilt = [_unit(status.roll_rad), _unit(status.pitch_rad)]
     feet = sum(1 << leg for leg, on_floor in enumerate(status.on_floor) if on_floor)
-    if not math.isfinite(status.turn_rad_s):
+    if not math.isfinite(status.turn_rad_s / TURN_RAD_S):
         raise MalformedPacket(f"a turning speed of {status.turn_rad_s} rad/s")
     turn = max(-0x8000, min(0x7FFF, round(status.turn_rad_s / TURN_RAD_S)))
     return b"T" + _STATUS.pack(round(status.battery * 255), *tilt, *_units(status.joints_rad), turn, feet)
@@ -148,7 +148,7 @@ def _units(angles_rad: Angles) -> list[int]:
 
 
 def _unit(angle_rad: float) -> int:
-    units = round(angle_rad / ANGLE_RAD) if math.isfinite(angle_rad) else 1 << 15
+    units = round(angle_rad / ANGLE_RAD) if math.isfinite(angle_rad / ANGLE_RAD) else 1 << 15
     if not -(1 << 15) <= units < 1 << 15:
         raise MalformedPacket(f"an angle of {angle_rad} rad does not fit 16 bits of {ANGLE_RAD} rad")
     return units

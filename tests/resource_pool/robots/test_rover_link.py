@@ -107,6 +107,7 @@ def test_malformed_bytes_and_what_only_a_scout_can_do_are_refused(payload: bytes
         MovePacket(math.nan, 0.0),
         MovePacket(0.0, math.inf),
         MovePacket(33.0, 0.0),
+        MovePacket(0.0, 1e306),
         GripPacket(-0.1, 0.0),
         GripPacket(0.0, math.nan),
     ],

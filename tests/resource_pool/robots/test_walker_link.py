@@ -99,6 +99,7 @@ def test_what_is_no_status_is_refused(payload: bytes) -> None:
         ((float("nan"),) * 12, 0.0),
         ((float("inf"),) * 12, 0.0),
         ((3.3,) * 12, 0.0),
+        ((1e306,) * 12, 0.0),
         ((0.0,) * 12, -0.1),
         ((0.0,) * 12, 1.1),
         ((0.0,) * 12, float("nan")),
