@@ -15,6 +15,7 @@ import logging
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from operator import index
 from typing import Annotated, Literal
 
 import msgspec
@@ -155,6 +156,18 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     def _deliver(self, hold: Hold, order: Tune, picture: Picture, numbers: Iterator[int]) -> None:
         if not self.holds.has(hold.arc, hold.epoch):
             return  # a driver may deliver one picture after its stop
+        try:
+            self._take(hold, order, picture, numbers)
+        except (ValueError, TypeError) as wrong:  # not raised, because a driver may call from a callback that loses it
+            self.fail(HardwareFault(f"the driver of {self.name} delivers a wrong picture: {wrong}"))
+
+    def _take(self, hold: Hold, order: Tune, picture: Picture, numbers: Iterator[int]) -> None:
+        """Publish the picture if it is in time and wanted.
+
+        Raises:
+            ValueError: It has no legal size, or other pixels than its size says.
+            TypeError: A value is not of the type that ``Picture`` declares.
+        """
         if not self._is_in_time(picture.captured_s):
             return
         if picture.kind:
@@ -165,23 +178,20 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             self._silent_since_s = math.inf
         if not self.is_wanted(picture, order.robot):
             return
-        try:
-            if not all(LEAST_PX <= side_px <= MOST_PX for side_px in (picture.width_px, picture.height_px)):
-                raise ValueError(f"{picture.width_px} x {picture.height_px} pixels, each side {LEAST_PX} to {MOST_PX}")
-            frame = Frame(
-                rc=self.name,
-                arc=hold.arc,
-                epoch=hold.epoch,
-                robot=picture.robot or order.robot,
-                number=next(numbers),
-                captured_s=picture.captured_s,
-                width_px=picture.width_px,
-                height_px=picture.height_px,
-                pixels=_in_a_row(picture.pixels),
-            )
-        except (ValueError, TypeError) as wrong:  # not raised, because a driver may call from a callback that loses it
-            self.fail(HardwareFault(f"the driver of {self.name} delivers a wrong picture: {wrong}"))
-            return
+        width_px, height_px = index(picture.width_px), index(picture.height_px)  # listeners drop others unseen
+        if not all(LEAST_PX <= side_px <= MOST_PX for side_px in (width_px, height_px)):
+            raise ValueError(f"{width_px} x {height_px} pixels, each side {LEAST_PX} to {MOST_PX}")
+        frame = Frame(
+            rc=self.name,
+            arc=hold.arc,
+            epoch=hold.epoch,
+            robot=picture.robot or order.robot,
+            number=next(numbers),
+            captured_s=float(picture.captured_s),
+            width_px=width_px,
+            height_px=height_px,
+            pixels=_in_a_row(picture.pixels),
+        )
         self._delivered += 1
         at = address(Subsystem.RESOURCE_POOL, hold.arc)
         self.bus.publish(f"{at}/{order.camera}" if order.camera else at, Conversation.FRAMES, frame)

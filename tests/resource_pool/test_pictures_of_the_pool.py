@@ -71,14 +71,15 @@ WRONG = {
 EMPTY = {"nothing": (0, 0), "a row": (6, 1), "a row too long for any message": (8193, 2)}
 
 
-async def delivered(pool: Pool, pixels: Any, width_px: int = 6, height_px: int = 4) -> list[Frame]:
+async def delivered(pool: Pool, pixels: Any, width_px: Any = 6, height_px: Any = 4, **more: Any) -> list[Frame]:
     """Return what arrives of one picture of this size that a driver delivers from its thread."""
     heard: list[Frame] = []
     pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
     await connect(pool, "grabber", "one", 1)
     await pool.voice("one").ask(at("grabber"), Tune("video").under("one", 1), Applied, within_s=1)
     deliver = pool.grabber_driver.deliver
-    picture = Picture(pool.clock.now_s(), pixels, width_px, height_px)
+    given = {"captured_s": pool.clock.now_s(), "pixels": pixels, "width_px": width_px, "height_px": height_px}
+    picture = Picture(**(given | more))
     asyncio.get_running_loop().call_soon_threadsafe(deliver, picture)
     await pool.clock.sleep_s(0.1)
     return heard
@@ -108,6 +109,36 @@ def test_a_driver_that_delivers_a_picture_of_no_size_ends_the_rc_and_no_behavior
             bug = await pool.outcome("grabber")
             assert isinstance(bug, HardwareFault)
             assert f"{width_px} x {height_px} pixels" in str(bug)
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"width_px": 6.0}, {"height_px": None}, {"captured_s": None}, {"captured_s": "1"}, {"transmitters": None}],
+    ids=str,
+)
+def test_a_value_of_another_type_than_declared_ends_the_rc_and_is_not_lost_in_a_callback(
+    local_mission: Any, wrong: dict[str, Any]
+) -> None:
+    """OpenCV returns a video's width as a float; each listener dropped such a picture, and all was well."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["grabber"], manager=False) as pool:
+            assert await delivered(pool, bytes(24), **wrong) == []
+            bug = await pool.outcome("grabber")
+            assert isinstance(bug, HardwareFault)
+            assert "delivers a wrong picture" in str(bug)
+
+    run_virtual(main())
+
+
+def test_numbers_of_numpy_become_those_of_a_message(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["grabber"], manager=False) as pool:
+            now_s = np.float32(pool.clock.now_s() + 0.5)
+            [frame] = await delivered(pool, bytes(24), width_px=np.int64(6), captured_s=now_s)
+            assert (type(frame.width_px), type(frame.captured_s)) == (int, float)
 
     run_virtual(main())
 
