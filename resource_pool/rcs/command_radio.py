@@ -305,16 +305,20 @@ class CommandRadio(ResourceController[RcParameters]):
         self._on_air_s += took_s
         self._worst_packet_s = max(self._worst_packet_s, took_s)
         if sending.number >= 0 and reported_s is not None:
-            self._measured(sending, reported_s)
+            self._measured(sending, took_s)
         for news in self._schedule.sent(sending, begun_s, took_s):
             log.warning("%s: %s", packet.arc, news)
             self.publish_event(packet.arc, f"on {self.name}: {news}")
 
     def _credible(self, reported_s: float) -> float:
-        """Return the driver's time on the air, unless it would block the air for no real reason."""
-        if not 0 <= reported_s <= LONGEST_PACKET_S:
-            raise HardwareFault(f"the driver of {self.name} reports {reported_s} s on the air for one packet")
-        return reported_s
+        """Return the driver's time on the air, unless it is no number or would block the air for no real reason."""
+        try:
+            took_s = float(reported_s)
+        except (TypeError, ValueError):
+            took_s = math.nan
+        if not 0 <= took_s <= LONGEST_PACKET_S:
+            raise HardwareFault(f"the driver of {self.name} reports {reported_s!r} s on the air for one packet")
+        return took_s
 
     def _measured(self, sending: Sending, took_s: float) -> None:
         """Publish the longest time of these packets if it is new and longer than declared."""
