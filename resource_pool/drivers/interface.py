@@ -6,6 +6,7 @@ driver: one of ``BUILT_IN`` for its kind, or ``package.module:Class``.
 
 from __future__ import annotations
 
+import asyncio
 import importlib
 import math
 from collections.abc import Callable, Mapping
@@ -21,6 +22,7 @@ from backbone.errors import Refusal
 from backbone.ranges import Share
 
 Options = TypeVar("Options", bound=msgspec.Struct)
+OPENS_WITHIN_S = 60.0  # chosen: three times as long as a world may take to answer; machine seconds
 
 
 class UnknownDriver(Refusal):
@@ -287,6 +289,21 @@ def build_driver(kind: str, name: str, site: DriverSite) -> Any:
     found = driver_class(driver_path(kind, name, site.resource), site.resource)
     site.options(getattr(found, "options_type", NoOptions))
     return found(site)
+
+
+async def open_device(driver: RadioDriver | FramegrabberDriver, resource: str) -> None:
+    """Open the device of a resource.
+
+    Raises:
+        HardwareFault: It hangs; otherwise its RC would be about to start for ever, without a reason.
+    """
+    try:
+        async with asyncio.timeout(OPENS_WITHIN_S) as limit:
+            await driver.open()
+    except TimeoutError:
+        if not limit.expired():
+            raise
+        raise HardwareFault(f"the driver of {resource} did not open the device within {OPENS_WITHIN_S:g} s") from None
 
 
 def options_of_drivers(kind: str) -> dict[str, type[msgspec.Struct]]:

@@ -35,7 +35,7 @@ from backbone.naming import Subsystem, address, component_of
 from backbone.rc_manager.messages import LONGEST_PACKET_S, RcState, StaleEpoch
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import AnsweringRadio, HardwareFault, RadioDriver
+from resource_pool.drivers.interface import AnsweringRadio, HardwareFault, RadioDriver, open_device
 from resource_pool.holds import Hold
 from resource_pool.link_watch import LinkNews, LinkWatch
 from resource_pool.messages import (
@@ -92,7 +92,7 @@ class CommandRadio(ResourceController[RcParameters]):
     async def connect(self) -> None:
         """Open the device."""
         await super().connect()
-        await self._driver.open()
+        await open_device(self._driver, self.name)
 
     async def serve(self) -> None:
         """Send due packets, and end holds whose leases have expired."""

@@ -28,7 +28,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.ranges import MOST_PX
 from resource_pool.commands import Command, Tune
-from resource_pool.drivers.interface import FramegrabberDriver, HardwareFault, Picture, YieldingDriver
+from resource_pool.drivers.interface import FramegrabberDriver, HardwareFault, Picture, YieldingDriver, open_device
 from resource_pool.holds import Hold
 from resource_pool.messages import Accepted, Frame, NothingHeard
 from resource_pool.resource_controller import RcParameters, ResourceController
@@ -84,7 +84,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     async def connect(self) -> None:
         """Open the device now, so that the first grant is as fast as later ones."""
         await super().connect()
-        await self._driver.open()
+        await open_device(self._driver, self.name)
 
     async def drain(self) -> None:
         """Stop and close the device."""

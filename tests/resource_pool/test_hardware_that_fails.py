@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from typing import Any
 
 import pytest
-from pool_on_local_network import a_pool
+from pool_on_local_network import WiretappedRadio, a_pool
 from pool_orders import ROBOTS, at, command, connect, connect_robot, disconnect, state_of
 
 from backbone.bus.clock import run_virtual
@@ -42,6 +43,33 @@ def test_a_radio_that_breaks_while_it_sends_ends_as_failed_and_says_what_broke(l
             assert isinstance(bug, HardwareFault)
             assert "antenna" in str(bug)
             assert pool.radio_driver.closed == 1
+
+    run_virtual(main())
+
+
+class RadioThatDoesNotOpen(WiretappedRadio):
+    """Waits for its device for ever, or for a time limit of its own."""
+
+    limit_s: float | None = None
+
+    async def open(self) -> None:
+        async with asyncio.timeout(self.limit_s):
+            await asyncio.Event().wait()
+
+
+@pytest.mark.parametrize(("limit_s", "error", "after_s"), [(None, HardwareFault, 60.0), (3.0, TimeoutError, 3.0)])
+def test_a_device_whose_opening_hangs_ends_the_start_of_its_rc(
+    local_mission: Any, monkeypatch: pytest.MonkeyPatch, limit_s: float | None, error: type[Exception], after_s: float
+) -> None:
+    """Otherwise the mission comes up for ever, and no one learns what it waits for."""
+    monkeypatch.setattr(RadioThatDoesNotOpen, "limit_s", limit_s)
+
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            begun_s = pool.clock.now_s()
+            with pytest.raises(error):
+                await pool.rc("radio", driver=f"{__name__}:{RadioThatDoesNotOpen.__name__}")
+            assert pool.clock.now_s() - begun_s == pytest.approx(after_s, abs=1.0)
 
     run_virtual(main())
 
