@@ -370,7 +370,7 @@ class Explanation:
 def _what_brings_back(rc: RcEntry) -> str:
     if rc.fault:
         return f"its report is credible again; a restart helps: 'scout-backbone stop {rc.name}', then 'start {rc.kind}'"
-    return "its process answers again"
+    return "its process answers, and its hardware is in the safe state"
 
 
 def _expected_s(arc: ArcEntry, granted_s: float) -> float:

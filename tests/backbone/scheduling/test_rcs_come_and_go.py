@@ -41,6 +41,13 @@ def test_an_rc_that_is_removed_is_gone():
     assert bench.answers.schedule(bench.now_s).requests == []
 
 
+def test_why_names_both_things_that_bring_an_rc_back():
+    """Its process may answer all the time, and refuse each connection because its device does not obey."""
+    bench = Bench(manager(), W)
+    bench.tell(RcWentDown("w"))
+    assert bench.answers.why("w", 0.0).would_change == "its process answers, and its hardware is in the safe state"
+
+
 def test_an_rc_that_is_up_or_asked_for_stays_until_it_is_neither():
     bench = Bench(manager(), V, W)
     bench.tell(RcRemoved("w"))
