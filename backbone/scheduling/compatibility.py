@@ -89,6 +89,10 @@ class Compatibility:
     def forget(self, arc: ArcEntry) -> None:
         """Drop the answers about an ARC that left."""
         self._usable.pop(arc, None)
+        for rc in arc.uses:
+            known = self._admitted.get(rc, {})
+            for users in [users for users in known if arc in users]:
+                del known[users]
 
     def _admissible(self, rc: str, users: Sequence[ArcEntry]) -> bool:
         known = self._admitted.setdefault(rc, {})

@@ -207,6 +207,7 @@ class ScheduleState:
         self.enter(arc, RequestState.IDLE, arc.since_s)
         self.compatibility.forget(arc)
         del self.arcs[arc.name]
+        self._forget_levels()
 
     def set_paths(self, paths: Iterable[tuple[ArcEntry, tuple[str, ...], Path]]) -> None:
         """Set the places of these ARCs in the tree, and their numbers."""
