@@ -345,6 +345,9 @@ class ArcEvents:
         self._retries_s.pop(arc.name, None)
         self.understating.pop(arc.name, None)
         self._state.forget(arc)
+        if arc.request.console:
+            present = [other.place_in_tree for other in self._state.arcs.values()]
+            self._trace.forget_nodes(self._tree.forget(arc.place_in_tree, present))
         successor = self._successors.pop(arc.name, None)
         if successor is not None:
             self.requested(successor)

@@ -23,7 +23,9 @@ class Damping:
 
     def left_in_vain(self, owner: str, now_s: float) -> None:
         """Count a request of this owner that cut a slice short and was withdrawn before its grant."""
-        self._left[owner] = min(MOST, self._count(owner, now_s) + 1), now_s
+        count = min(MOST, self._count(owner, now_s) + 1)
+        self._left = {one: left for one, left in self._left.items() if self._count(one, now_s) > 0}
+        self._left[owner] = count, now_s
 
     def wait_s(self, owner: str, now_s: float) -> float:
         """Return how long the next request of this owner must wait before it counts, seconds; 0 as a rule.

@@ -12,7 +12,7 @@ from backbone.scheduling.requests import PathNode
 
 
 class PriorityTree:
-    """The places and numbers of all nodes and consoles that ever sent a request.
+    """The places and numbers of all nodes that ever sent a request, and of the consoles with a request.
 
     A number or place that an operator set stays until the operator sets another. All other nodes have the numbers and
     places of the newest request. A request always names the path with which its owner was started; later moves lead
@@ -50,11 +50,29 @@ class PriorityTree:
 
     def path(self, names: tuple[str, ...]) -> Path:
         """Return the path with its present numbers; paths with a common part share its objects."""
+        if len(self._shared) > 2 * len(self._numbers):
+            self._shared.clear()  # most of them have a number of earlier
         numbered = [
             (name, self._numbers[way] + self._raised.get(way, 0))
             for name, way in ((name, names[: depth + 1]) for depth, name in enumerate(names))
         ]
         return tuple(self._shared.setdefault(node, node) for node in numbered)
+
+    def forget(self, names: tuple[str, ...], present: Iterable[tuple[str, ...]]) -> list[tuple[str, ...]]:
+        """Forget the nodes on the path of a console's last request: each console has a name of its own.
+
+        Args:
+            names: The path.
+            present: The paths of all other requests; their nodes stay.
+
+        Returns:
+            The paths of the forgotten nodes.
+        """
+        used = {way[:depth] for way in present for depth in range(1, len(way) + 1)}
+        gone = [names[:depth] for depth in range(1, len(names) + 1) if names[:depth] not in used]
+        for way in gone:
+            self._numbers.pop(way, None)
+        return gone
 
     def nodes(self, names: tuple[str, ...]) -> list[PathNode]:
         """Return the path of a request with its numbers as set, without aging."""

@@ -105,6 +105,11 @@ class TraceWriter:
             cause = "its parent" if told is not None and told[0] != parent else "its number among its siblings"
             self.record("node", cause, id=self._id(way), parent=parent, prio=number)
 
+    def forget_nodes(self, ways: Iterable[tuple[str, ...]]) -> None:
+        """Introduce these consoles again with their next requests."""
+        for way in ways:
+            self._nodes.pop(way, None)
+
     def nodes(self) -> list[tuple[str, ...]]:
         """Return the paths of all introduced nodes."""
         return [*self._nodes]
