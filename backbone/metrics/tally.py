@@ -4,6 +4,7 @@ Rules of this file:
 
 * No number decreases. Time is counted up to the newest known instant. News about an earlier instant changes only what
   is counted afterwards.
+* Each console has ARCs of its own. So of the ARCs that left, only the last ``GONE_KEPT`` have numbers.
 * An RC that is not sharable is held for no longer than the watched time.
 * A hold counts until its lease expires: while the RC manager is silent, nothing newer is known.
 """
@@ -20,6 +21,7 @@ from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 
+GONE_KEPT = 100  # chosen: the consoles of a busy hour, so that each page read by Prometheus had their last numbers
 BUCKETS_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Upper ends of the buckets of switch times. Chosen: from a switch between drivers to one that waits for a person."""
 
@@ -66,6 +68,8 @@ class Tally:
         self.revocations: Counter[tuple[str, str, str]] = Counter()
         self.switches: dict[str, SwitchHistogram] = {}
         self.is_up: dict[str, bool] = {}
+        self._arcs: dict[str, None] = {}
+        """ARCs with numbers; who was heard of last comes last."""
         self._schedule: Schedule | None = None
         self._now_s = self._known_until_s = float("-inf")
         self._granted: dict[tuple[str, str], int] = {}
@@ -81,6 +85,10 @@ class Tally:
         for rc in schedule.rcs:
             if not rc.sharable:
                 self.switches.setdefault(rc.rc, SwitchHistogram())
+        for request in schedule.requests:
+            self._heard_of(request.arc)
+        while len(self._arcs) > GONE_KEPT + len(schedule.requests):
+            self._forget(next(iter(self._arcs)))
 
     def take_leases(self, leases: Leases, at_s: float) -> None:
         """Apply leases that were sent at this time: for their duration, the schedule is known."""
@@ -95,10 +103,12 @@ class Tally:
         """Apply one line of the trace of the schedule."""
         match line:
             case {"ev": "revoke", "t": at_s, "arc": arc, "why": why}:
+                self._heard_of(arc)
                 for rc in self._held_by(arc):
                     self.revocations[rc, arc, why] += 1
                     self._revoked[rc] = at_s, line.get("by", "")
             case {"ev": "grant", "t": at_s, "arc": arc, "epoch": dict(epochs)}:
+                self._heard_of(arc)
                 for rc, epoch in epochs.items():
                     self._granted_to(rc, arc, epoch, at_s)
 
@@ -117,6 +127,19 @@ class Tally:
             if request.state is RequestState.WAITING:
                 for name in request.rcs:
                     self.waited_s[name, request.arc] += known_s
+
+    def _heard_of(self, arc: str) -> None:
+        self._arcs.pop(arc, None)
+        self._arcs[arc] = None
+
+    def _forget(self, arc: str) -> None:
+        del self._arcs[arc]
+        numbers: tuple[dict[Any, Any], ...] = (self.held_s, self.waited_s, self.grants, self.revocations, self._granted)
+        for by_rc in numbers:
+            for key in [key for key in by_rc if key[1] == arc]:
+                del by_rc[key]
+        for state in RequestState:
+            self.in_state_s.pop((arc, state), None)
 
     def _held_by(self, arc: str) -> list[str]:
         rcs = self._schedule.rcs if self._schedule is not None else []

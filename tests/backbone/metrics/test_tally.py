@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.metrics.tally import BUCKETS_S, Tally
+from backbone.metrics.tally import BUCKETS_S, GONE_KEPT, Tally
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
@@ -133,3 +133,21 @@ def test_an_rc_that_was_not_revoked_for_its_next_holder_was_not_handed_over(why:
     tally.take_line({"ev": "revoke", "t": 5.0, "arc": "anna-drive", **why})
     tally.take_line({"ev": "grant", "t": 900.0, "arc": "watch-capture", "epoch": {"scout1": 7}})
     assert sum(tally.switches["scout1"].counts) == 0
+
+
+def test_of_the_arcs_that_left_only_the_last_ones_have_numbers():
+    tally, visits = Tally(), 5 * GONE_KEPT
+    for visit in range(visits):
+        arc, at_s = f"console-{visit}-drive", 10.0 * visit
+        held = [rc_view(rc, [arc, "watch"] if rc == SHARABLE else [arc], visit) for rc in RCS]
+        requests = [request("watch", RequestState.RUNNING), request(arc, RequestState.WAITING)]
+        tally.take_line({"ev": "grant", "t": at_s, "arc": arc, "epoch": dict.fromkeys(RCS, visit)})
+        tally.take_schedule(Schedule(at_s, held, requests, []))
+        tally.take_leases(Leases([], 20.0), at_s)
+        tally.take_line({"ev": "revoke", "t": at_s + 9.0, "arc": arc, "why": "self"})
+    tally.take_schedule(Schedule(10.0 * visits, [rc_view(rc, []) for rc in RCS], [requests[0]], []))
+    arcs = [{key[1] for key in of} for of in (tally.held_s, tally.waited_s, tally.grants, tally.revocations)]
+    last = {f"console-{visit}-drive" for visit in range(visits - GONE_KEPT, visits)}
+    assert arcs == [last | {"watch"}, last, last, last]
+    assert {key[0] for key in tally.in_state_s} == last | {"watch"}
+    assert tally.held_s[SHARABLE, "watch"] == pytest.approx(10.0 * visits)
