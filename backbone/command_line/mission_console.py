@@ -143,7 +143,7 @@ class ConsoleObserver:
 
     def _heard(self, envelope: Envelope[StoryEvent | OperatorActed | ComponentState]) -> None:
         said = printable_all(envelope.body)
-        self._picture.take(said, envelope.source)
+        self._picture.log.take(said, envelope.source)
         if not self._live and not isinstance(said, ComponentState):
             [event] = self._picture.log.newest(1)
             self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")

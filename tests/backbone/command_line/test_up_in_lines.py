@@ -1,0 +1,37 @@
+"""The lines of a mission that is up without a live picture."""
+
+from __future__ import annotations
+
+import gc
+import io
+
+from rich.console import Console
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.local_bus import LocalNetwork
+from backbone.command_line.mission_console import ConsoleObserver
+from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.keys import Conversation
+
+
+def test_consoles_that_came_and_went_are_not_kept_but_named_by_their_people() -> None:
+    lines = io.StringIO()
+
+    async def scene() -> None:
+        clock, network = VirtualClock(), LocalNetwork("lines")
+        observer = ConsoleObserver(Console(file=lines), live=False)
+        observer.connected(network.join("backbone/launcher", clock))
+        for number in range(100):
+            address = f"ui_console/console-{number}"
+            bus = network.join(address, clock)
+            state = ComponentState(address, "console", "base", number, LifeState.READY, 0.0, user=f"Anna {number}")
+            bus.publish(address, Conversation.STATUS, state)
+            story = StoryEvent(0.0, address, f"was taken by console-{number}-drive", "scout1", "")
+            bus.publish(address, Conversation.LOG, story)
+            await clock.sleep_s(1.0)
+            await bus.close()
+        kept = [one for one in gc.get_objects() if isinstance(one, dict) and "ui_console/console-7" in one]
+        assert kept == []
+
+    run_virtual(scene())
+    assert "was taken by Anna 99" in lines.getvalue()
