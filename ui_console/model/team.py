@@ -233,8 +233,10 @@ class TeamModel:
         self.picture.take(schedule)
         self._timeline.heard(schedule)
         now = {request.arc for request in schedule.requests}
-        self._arcs |= now
-        self._tree.scheduled(schedule)
+        there = {component_of(address) for address in (*self.picture.components, *self._lost)}
+        self._arcs = (self._arcs & there) | now
+        self._tree.scheduled(schedule, there)
+        self._left &= {rc.rc for rc in schedule.rcs}
         for arc in before - now:
             self.alarms.end(AlarmKind.STARVING, arc, schedule.at_s)
         for rc in schedule.rcs:
@@ -260,7 +262,6 @@ class TeamModel:
 
     def _take_component(self, component: ComponentState, at_s: float) -> None:
         address, name = component.address, component_of(component.address)
-        self._needs.heard(component)
         known = self.picture.components.get(address)
         if known is not None and is_older(component, known):
             return
@@ -272,6 +273,7 @@ class TeamModel:
             if known is None:
                 self.alarms.retract(AlarmKind.LOST, name)  # its last state arrived after the message of its loss
             return
+        self._needs.heard(component)
         if component.state is LifeState.FAILED:
             self.alarms.happened(AlarmKind.LOST, name, f"{name} failed: {component.feedback}", at_s)
             return

@@ -6,7 +6,7 @@ from stories; the nodes that exist, and the lost ones, are arguments of a view.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.mission.model import EXECUTION_UNIT
@@ -38,9 +38,10 @@ class TreeBoard:
         self._finished: dict[str, tuple[float, NodeState]] = {}
         self._priorities: dict[str, int] = {}
 
-    def scheduled(self, schedule: Schedule) -> None:
-        """Record the priorities of all nodes with a request."""
-        self._priorities |= _priorities(schedule.requests)
+    def scheduled(self, schedule: Schedule, there: Set[str]) -> None:
+        """Record the priorities of all nodes with a request; of other nodes, those that are ``there`` keep theirs."""
+        kept = {name: number for name, number in self._priorities.items() if name in there}
+        self._priorities = kept | _priorities(schedule.requests)
 
     def told(self, story: StoryEvent) -> None:
         """Record that a node finished, if the event is the node's own report."""
