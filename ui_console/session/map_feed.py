@@ -63,6 +63,8 @@ class MapFeed:
     def heard(self, said: Said) -> None:
         """Record the components of the mission."""
         match said:
+            case ComponentState(address=at, state=LifeState.STOPPED):  # may come after ``Disappeared``
+                self._there.pop(at, None)
             case ComponentState(address=at):
                 self._there[at] = said
             case Components(components=components):

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import ComponentState, LifeState
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.nameserver.messages import Disappeared
 from backbone.naming import Subsystem
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import AskFloorPlan, AskPose, FloorPlan, Pose, PoseSource
 from ui_console.model.console import ConsoleModel
-from ui_console.session.map_feed import AGAIN_S, QUIET_S
+from ui_console.session.map_feed import AGAIN_S, QUIET_S, MapFeed
 from ui_console.session.observer import Observer
 
 Scene = Callable[["Stage"], Awaitable[None]]
@@ -150,3 +155,16 @@ def test_a_localizer_is_heard_in_place_of_the_world_and_asked_once_it_is_silent(
             assert not on.model.team.map.views(on.clock.now_s())[0].is_stale, "it stands"
 
     stage(scene)
+
+
+def test_a_component_whose_last_state_comes_after_its_disappearance_is_not_kept() -> None:
+    async def main() -> None:
+        clock = VirtualClock()
+        feed = MapFeed(LocalNetwork("map").join("ui_console/web-1", clock), clock, lambda _event: None)
+        for number in range(20):
+            state = ComponentState(f"ui_console/console-{number}", "console", "base", number, LifeState.READY, 0.0)
+            for said in (state, Disappeared(state.address), replace(state, state=LifeState.STOPPED)):
+                feed.heard(said)
+        assert not [one for one in gc.get_objects() if isinstance(one, dict) and "ui_console/console-7" in one]
+
+    run_virtual(main())
