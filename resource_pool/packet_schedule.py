@@ -28,6 +28,7 @@ from backbone.scheduling.requests import Usage
 
 MAIN_KIND = "drive"  # chosen: the stream whose packets keep a robot running
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times, far below a packet
+REPORTS_KEPT = 1000  # chosen: the ARCs of a busy day; a fault of an earlier one is news again
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +194,7 @@ class PacketSchedule:
 
     def __init__(self) -> None:
         self._senders: dict[str, _Sender] = {}
-        self._reported: set[tuple[str, int, str]] = set()
+        self._reported: dict[tuple[str, int, str], None] = {}
 
     def connect(self, arc: str, streams: list[Usage], rank: int) -> None:
         """Add the ARC's streams; each begins with its first packet.
@@ -321,7 +322,9 @@ class PacketSchedule:
         if stream.overruns:
             news.append(("late", f"{what} are not always done within {stream.deadline_s:g} s of their release"))
         found = [(fault, line) for fault, line in news if (arc, number, fault) not in self._reported]
-        self._reported |= {(arc, number, fault) for fault, _ in found}
+        self._reported |= {(arc, number, fault): None for fault, _ in found}
+        while len(self._reported) > REPORTS_KEPT:
+            del self._reported[next(iter(self._reported))]
         return [line for _, line in found]
 
     def counts(self) -> dict[str, ArcCount]:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from backbone.scheduling.requests import Usage
 from backbone.scheduling.response_time import admissible, worst_response_us
 from backbone.scheduling.streams import stream
-from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
+from resource_pool.packet_schedule import REPORTS_KEPT, Packet, PacketSchedule, Sending
 
 PERIODS_MS = st.sampled_from([10, 20, 25, 40, 50, 80, 100])
 
@@ -329,3 +329,16 @@ def test_a_packet_that_waits_for_its_turn_is_dropped_and_what_stands_still_is_ke
     schedule.load(halt, 0.0)
     sent = [schedule.take(at_s / 10) for at_s in range(2)]
     assert [(one.packet.payload, one.packet.robot_stop) for one in sent if one] == [(b"video on", 1), (b"halt", 1)]
+
+
+def test_of_ever_new_arcs_only_the_last_ones_are_known_to_have_been_late() -> None:
+    schedule, told = PacketSchedule(), []
+    for number in [*range(REPORTS_KEPT + 1), REPORTS_KEPT, 0]:
+        arc, begin_s = f"console-{number}-drive", float(len(told))
+        schedule.connect(arc, [Usage(0.1, 0.002, deadline_s=0.01)], 0)
+        schedule.load(packet(arc), begin_s)
+        sending = schedule.take(begin_s)
+        assert sending is not None
+        told.append(len(schedule.sent(sending, begin_s + 0.05, 0.002)))
+        schedule.disconnect(arc)
+    assert told == [1] * (REPORTS_KEPT + 1) + [0, 1]
