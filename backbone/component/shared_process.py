@@ -155,6 +155,9 @@ class SharedProcess:
         for other in self._lives:
             if self._members[other].launch.name == launch.name:
                 raise AlreadyMember(f"{launch.name} lives in {self.address} as life {other}", life=other)
+        former = [one for one, member in self._members.items() if member.launch.name == launch.name]
+        for one in former:  # ended, and the creator knows it
+            del self._members[one]
         member = self._members[life] = _Member(launch)
         if self._end.is_set():
             member.end("its process ends")

@@ -320,6 +320,9 @@ def test_admission_may_be_asked_twice_and_a_name_lives_once(local_mission: Calla
             await bus.ask("resource_pool/scout1", Stop("over"), Stopping, within_s=1.0)
             assert (await ended) == MemberEnded(1, 0)
             assert await bus.ask(shared.address, AwaitEnd(1), MemberEnded, within_s=1.0) == MemberEnded(1, 0)
+            await bus.ask(shared.address, BeginMember(launch("Quiet", "scout1"), 3), MemberBegun, within_s=1.0)
+            with pytest.raises(NotAMember):  # else each restart of a member would leave a life in the process
+                await bus.ask(shared.address, AwaitEnd(1), MemberEnded, within_s=1.0)
             shared.end("over")
             await running
             await bus.close()
