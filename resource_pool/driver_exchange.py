@@ -37,8 +37,8 @@ from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
 from backbone.reading_anew import WrongClass, read_anew
 from backbone.waiting import only_bugs, set_within
-from resource_pool.driver_slot import DriverSlot, methods_of
-from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions, driver_class, driver_path
+from resource_pool.driver_slot import DriverSlot
+from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions, driver_class, driver_path, methods_of
 
 log = logging.getLogger(__name__)
 

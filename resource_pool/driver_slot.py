@@ -158,12 +158,6 @@ def _proxy_class(driver: type[Any]) -> type[_Proxy]:
     return type("DriverProxy", (_Proxy,), methods)
 
 
-def methods_of(driver: object) -> set[str]:
-    """Return the names of the driver's methods that an RC may call."""
-    found = inspect.getmembers(driver if isinstance(driver, type) else type(driver), callable)
-    return {name for name, method in found if not name.startswith("_") and not isinstance(method, type)}
-
-
 def _waiting(name: str) -> Callable[..., object]:
     async def method(self: _Proxy, *arguments: object, **named: object) -> object:
         return await self._slot.call_later(name, arguments, named)

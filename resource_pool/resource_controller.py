@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -82,6 +83,8 @@ class ResourceController(Component[R], Generic[R]):
     """Model of a robot's camera, with which consoles convert points in a picture to places; None: not possible."""
     driver_kind: ClassVar[str] = ""
     """Kind of its driver; empty: it has no driver."""
+    driver_protocol: ClassVar[type] = object
+    """Protocol whose methods its driver must have."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
     """Parameters that its driver may change while it runs."""
     outlasts_s: ClassVar[float] = 0.0
@@ -128,9 +131,9 @@ class ResourceController(Component[R], Generic[R]):
         )
 
     @classmethod
-    def driver_options(cls) -> dict[str, type[msgspec.Struct]] | None:
-        """Return the options of each built-in driver of this RC's kind."""
-        return options_of_drivers(cls.driver_kind) if cls.driver_kind else None
+    def driver_options(cls, named: str = "") -> dict[str, type[msgspec.Struct]] | None:
+        """Return the options of each built-in driver of this RC's kind, and of a named driver."""
+        return options_of_drivers(cls.driver_kind, named, cls.driver_protocol) if cls.driver_kind else None
 
     # ------------------------------------------------------------------ hooks
     async def connected(self, hold: Hold) -> None:
@@ -187,7 +190,6 @@ class ResourceController(Component[R], Generic[R]):
     # ------------------------------------------------------------------ for derived classes
     def driver_site(self) -> DriverSite:
         """Return the interface for a driver of this RC."""
-        folder = Path(self.launch.run_directory) if self.launch.run_directory else None
         return DriverSite(
             self.name,
             self.bus,
@@ -195,7 +197,7 @@ class ResourceController(Component[R], Generic[R]):
             self.parameters,
             lambda what: self.publish_event(self.name, what),
             self.fail,
-            folder,
+            Path(self.launch.run_directory) if self.launch.run_directory else None,
             self._ends.remark,
         )
 
@@ -207,8 +209,8 @@ class ResourceController(Component[R], Generic[R]):
             WrongParameter: The driver refuses its options.
         """
         named = name or self.parameters.driver
-        made = self._exchanges.made(lambda site: build_driver(self.driver_kind, named, site), self.driver_site())
-        slot = DriverSlot(made)
+        build = partial(build_driver, self.driver_kind, named, protocol=self.driver_protocol)
+        slot = DriverSlot(self._exchanges.made(build, self.driver_site()))
         self._slots.append(slot)
         return slot.proxy
 

@@ -86,8 +86,8 @@ class Component(Generic[P_co]):
     """False only for the nameserver, which keeps the registry itself."""
 
     @classmethod
-    def driver_options(cls) -> dict[str, type[msgspec.Struct]] | None:
-        """Return the additional parameters of each built-in driver; None: the class uses no driver."""
+    def driver_options(cls, named: str = "") -> dict[str, type[msgspec.Struct]] | None:  # noqa: ARG003
+        """Return the additional parameters of each built-in driver, and of this one; None: it uses no driver."""
         return None
 
     @classmethod

@@ -21,6 +21,7 @@ from backbone.mission.needs_checks import check_needs, check_replaced
 from backbone.mission.parameter_checks import (
     check_class_parameters,
     check_class_path,
+    check_driver,
     check_service_parameters,
     check_type_class,
 )
@@ -140,7 +141,6 @@ def _main_host(tables: Tables) -> str:
 def _check_types(tables: Tables, report: Report) -> None:
     types = section(tables.root, "types")
     check_unique(types, "name", "type", report)
-    only_here = all(is_loopback(host.text("address")) for host in tables.hosts.values())
     for component_type in types:
         _check_core_type(component_type, report)
         if component_type.place != tables.root.place:
@@ -148,7 +148,7 @@ def _check_types(tables: Tables, report: Report) -> None:
             check_replaced(component_type, tables, report)
         _check_type_tags(component_type, tables, report)
         class_path = component_type.text("class")
-        is_own = only_here and class_path not in shipped_classes() and CLASS_PATH.fullmatch(class_path)
+        is_own = tables.is_only_here and class_path not in shipped_classes() and CLASS_PATH.fullmatch(class_path)
         if is_own and check_class_path(component_type, "class", report):
             check_type_class(component_type, tables.classes.get(class_path), report)
 
@@ -217,7 +217,8 @@ def _check_resources(tables: Tables, report: Report) -> None:
         check_parameters(resource, SET_BY_RESOURCE, report)
         check_class_parameters(resource, SET_BY_RESOURCE, tables, report)
         _check_uses(resource, tables, report)
-        _check_driver(resource, tables, report)
+        check_driver(resource, tables, report)
+        _check_world_of(resource, tables, report)
         if (facts := tables.facts_of(resource.text("type"))) is not None and ROOM in facts.given:
             check_floor_plan(resource, report)
         _check_network_id(resource, ids, report)
@@ -269,7 +270,7 @@ def _check_uses(resource: Element, tables: Tables, report: Report) -> None:
             )
 
 
-def _check_driver(resource: Element, tables: Tables, report: Report) -> None:
+def _check_world_of(resource: Element, tables: Tables, report: Report) -> None:
     if resource.text("driver") != SIMULATED:
         return
     if tables.world is None:

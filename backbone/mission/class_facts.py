@@ -94,6 +94,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     Attributes:
         parameters: Parameters that a mission file may set.
         options: Driver → further parameters while this driver is used; None: the class uses no driver.
+        driver_field: Parameter that names the driver if it is set; else the attribute ``driver`` does.
         has_rules: Whether it has rules for its parameters besides their types; only the class itself can check these.
         children: Fewest and most children of a behavior; None: any number.
         may_claim: False: a behavior of this class has no ARC.
@@ -107,6 +108,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     doc: str = ""
     parameters: tuple[ParameterFacts, ...] = ()
     options: dict[str, tuple[ParameterFacts, ...]] | None = None
+    driver_field: str = "driver"
     has_rules: bool = False
     children: tuple[int, int] | None = None
     may_claim: bool = True

@@ -14,6 +14,7 @@ import msgspec
 from backbone.component.class_faults import class_faults
 from backbone.component.component import Component
 from backbone.component.field_docs import field_docs
+from backbone.errors import Refusal
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
 
@@ -21,8 +22,9 @@ BY_CLASS_ALONE = ("multipleOf", "format", "contentEncoding")  # rules of a schem
 ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; a hang or kill of their process ends no more
 
 
-def facts_of(class_path: str) -> ClassFacts:
-    """Return the facts of a class; imports its module into this process."""
+def facts_of(asked: str) -> ClassFacts:
+    """Return the facts of a class, or of a class with a driver, as ``driven_by`` writes it; imports their modules."""
+    class_path, _, driver = asked.partition(" ")
     module, _, name = class_path.partition(":")
     try:
         found = getattr(importlib.import_module(module), name)
@@ -33,18 +35,21 @@ def facts_of(class_path: str) -> ClassFacts:
     if faults := "; ".join(class_faults(found)):
         return ClassFacts(failure=faults)
     try:
-        return _described(found)
+        return _described(found, driver)
+    except Refusal as error:
+        return ClassFacts(failure=error.detail)
     except Exception as error:  # a type of a parameter without a schema, or a hook of the class with a bug
         return ClassFacts(failure=f"its parameters or abilities cannot be listed: {type(error).__name__}: {error}")
 
 
-def _described(found: type[Component[Any]]) -> ClassFacts:
+def _described(found: type[Component[Any]], driver: str) -> ClassFacts:
     own = tuple(one for one in _documented(found.parameters_type) if one.name not in found.given_elsewhere)
-    options = found.driver_options()
+    options = found.driver_options(driver) if driver else found.driver_options()
     return ClassFacts(
         inspect.getdoc(found) or "",
         own,
         None if options is None else {driver: _documented(struct) for driver, struct in options.items()},
+        getattr(found, "driver_field", "driver"),
         _has_rules(found.parameters_type),
         children=getattr(found, "children_allowed", None),
         may_claim=getattr(found, "may_claim", True),

@@ -22,6 +22,7 @@ from backbone.mission.tables import (
     parameters,
     section,
 )
+from backbone.naming import is_legal
 from backbone.scheduling.rules import SchedulingRules
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")  # the schema refuses other names
@@ -52,10 +53,10 @@ def check_class_parameters(element: Element, reserved: Collection[str], tables: 
         tables: The mission.
     """
     kind = element.text("type")
-    facts = tables.facts_of(kind)
-    if facts is None:
+    facts = tables.facts_with_driver(element)
+    if facts is None or facts.failure:
         return
-    known = facts.parameters_with(element.text("driver"))
+    known = facts.parameters_with(tables.driver_of(element))
     if known is None:
         known = facts.parameters
         _check_values(element, {one.name: one for one in known}, report)
@@ -82,7 +83,7 @@ def open_questions(tables: Tables) -> list[tuple[Element, Question]]:
         given = parameters(element)
         if facts is None or not facts.has_rules or not given:
             continue
-        known = facts.parameters_with(element.text("driver")) or facts.parameters
+        known = facts.parameters_with(tables.driver_of(element)) or facts.parameters
         if all(one.accepts(given[one.name]) if one.name in given else not one.is_required for one in known):
             found.append((element, Question(tables.types[element.text("type")].text("class"), given)))
     return found
@@ -127,6 +128,34 @@ def check_type_class(component_type: Element, facts: ClassFacts | None, report: 
             component_type.place_of("class"),
             f"{component_type.text('class')}: {facts.failure}",
             "Write a component's class that this machine can import, or mend its module",
+        )
+
+
+def check_driver(resource: Element, tables: Tables, report: Report) -> None:
+    """Report a driver that does not exist or cannot work, as far as this machine knows its class."""
+    facts, driver = tables.facts_of(resource.text("type")), tables.driver_of(resource)
+    if facts is None or facts.options is None:
+        return
+    named = (one for one in resource.all("parameter") if one.text("name") == facts.driver_field and one.text("value"))
+    given = next(named, resource)
+    attribute = "driver" if given is resource else "value"
+    if CLASS_PATH.fullmatch(driver):
+        if not tables.is_only_here or not check_class_path(given, attribute, report):
+            return
+        with_driver = tables.classes.get(tables.driven(resource))
+        if with_driver is not None and with_driver.failure:
+            what = f"{resource.text('name')} cannot use this driver: {with_driver.failure}"
+            report.fault(
+                given.place_of(attribute), what, "Name a driver with the methods of its kind, or mend its module"
+            )
+        return
+    by_class = any(one.name == facts.driver_field and one.schema.get("default") for one in facts.parameters)
+    is_unused = given is resource and (by_class or not is_legal(driver))  # the schema refuses an illegal name
+    if driver not in facts.options and not is_unused:
+        report.fault(
+            given.place_of(attribute),
+            f"{resource.text('type')} has no driver {quoted(driver)}{report.hint(driver, facts.options)}",
+            f"Write a driver's class as package.module:Class; built in: {listed(facts.options) or 'none'}",
         )
 
 

@@ -100,4 +100,6 @@ def known_classes(root: Element) -> dict[str, ClassFacts]:
     known = shipped_classes()
     paths = {one.text("class") for one in section(root, "types")}
     asked = [path for path in sorted(paths - known.keys()) if CLASS_PATH.fullmatch(path) and not class_path_fault(path)]
-    return {**known, **ask_classes(asked)}
+    tables = Tables.of(root, {**known, **ask_classes(asked)})
+    drivers = [one for one in map(tables.driven, section(root, "resources")) if one]
+    return {**tables.classes, **ask_classes(drivers)}

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 
 import msgspec
 
+from backbone.authentication import is_loopback
 from backbone.mission.class_facts import ClassFacts
+from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
 from backbone.naming import Subsystem, is_legal
@@ -71,6 +73,31 @@ class Tables:
         """Return the facts of the class of this type; None: unknown."""
         found = self.classes.get(self.types[kind].text("class")) if kind in self.types else None
         return None if found is None or found.failure else found
+
+    def driver_of(self, resource: Element) -> str:
+        """Return the name or class path of the driver that the file names for a resource."""
+        facts = self.facts_of(resource.text("type"))
+        by_parameter = "" if facts is None else parameters(resource).get(facts.driver_field)
+        return str(by_parameter or resource.text("driver"))
+
+    def driven(self, resource: Element) -> str:
+        """Return class path and driver of a resource with a driver of its own, for ``ask_classes``; empty: it has none.
+
+        The driver must be on this machine, as far as can be seen without running code.
+        """
+        facts, driver = self.facts_of(resource.text("type")), self.driver_of(resource)
+        if not self.is_only_here or facts is None or facts.options is None or not CLASS_PATH.fullmatch(driver):
+            return ""
+        return "" if class_path_fault(driver) else f"{self.types[resource.text('type')].text('class')} {driver}"
+
+    def facts_with_driver(self, resource: Element) -> ClassFacts | None:
+        """Return the facts of the class of a resource, and of its driver where this is known."""
+        return self.classes.get(self.driven(resource)) or self.facts_of(resource.text("type"))
+
+    @property
+    def is_only_here(self) -> bool:
+        """True if no component runs on another machine."""
+        return all(is_loopback(host.text("address")) for host in self.hosts.values())
 
     def needs(self, kind: str) -> dict[str, str]:
         """Return role → type of resource that an ARC of this kind needs; empty if it is not an ARC."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import importlib
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -262,31 +263,42 @@ def driver_path(kind: str, name: str, resource: str) -> str:
     return path
 
 
-def driver_class(path: str, resource: str) -> Callable[[DriverSite], Any]:
+def driver_class(path: str, resource: str, protocol: type = object) -> Callable[[DriverSite], Any]:
     """Return the class at ``package.module:Class``; imports its file.
 
     Raises:
-        UnknownDriver: There is no such class.
+        UnknownDriver: There is no such class, or it lacks methods of this protocol.
     """
     module_name, _, class_name = path.partition(":")
     try:
         found: Callable[[DriverSite], Any] = getattr(importlib.import_module(module_name), class_name)
     except (ImportError, AttributeError) as error:
         raise UnknownDriver(f"{resource}: {path}: {error}") from error
+    if not callable(found):
+        raise UnknownDriver(f"{resource}: {path} is no class")
+    is_judged = isinstance(found, type) and not hasattr(found, "__getattr__")  # which may pass calls on to another
+    if is_judged and (lacking := methods_of(protocol) - methods_of(found)):
+        raise UnknownDriver(f"{resource}: {path} lacks {', '.join(sorted(lacking))}")
     return found
 
 
-def build_driver(kind: str, name: str, site: DriverSite) -> Any:
+def methods_of(driver: object) -> set[str]:
+    """Return the names of the driver's methods that an RC may call."""
+    found = inspect.getmembers(driver if isinstance(driver, type) else type(driver), callable)
+    return {name for name, method in found if not name.startswith("_") and not isinstance(method, type)}
+
+
+def build_driver(kind: str, name: str, site: DriverSite, protocol: type = object) -> Any:
     """Return the driver of this name, not open yet. Only this function imports its module, in the RC that needs it.
 
     A driver class gets the site. If it has a class variable ``options_type`` (a msgspec struct), it also gets
     ``site.options(options_type)``; else no options are allowed.
 
     Raises:
-        UnknownDriver: No driver has this name.
+        UnknownDriver: No driver has this name, or it lacks methods of the protocol.
         WrongParameter: The driver refuses its options.
     """
-    found = driver_class(driver_path(kind, name, site.resource), site.resource)
+    found = driver_class(driver_path(kind, name, site.resource), site.resource, protocol)
     site.options(getattr(found, "options_type", NoOptions))
     return found(site)
 
@@ -306,11 +318,14 @@ async def open_device(driver: RadioDriver | FramegrabberDriver, resource: str) -
         raise HardwareFault(f"the driver of {resource} did not open the device within {OPENS_WITHIN_S:g} s") from None
 
 
-def options_of_drivers(kind: str) -> dict[str, type[msgspec.Struct]]:
-    """Return for each built-in driver of a kind the struct of its options; imports their modules."""
-    found: dict[str, type[msgspec.Struct]] = {}
-    for name, path in BUILT_IN.get(kind, {}).items():
-        module_name, _, class_name = path.partition(":")
-        driver_class = getattr(importlib.import_module(module_name), class_name)
-        found[name] = getattr(driver_class, "options_type", NoOptions)
-    return found
+def options_of_drivers(kind: str, named: str = "", protocol: type = object) -> dict[str, type[msgspec.Struct]]:
+    """Return for each built-in driver of a kind, and for a named one, the struct of its options; imports their modules.
+
+    Raises:
+        UnknownDriver: No driver has this name, or it lacks methods of the protocol.
+    """
+    what = f"{kind} driver"
+    paths = {**BUILT_IN.get(kind, {}), **({named: driver_path(kind, named, what)} if named else {})}
+    return {
+        name: getattr(driver_class(path, what, protocol), "options_type", NoOptions) for name, path in paths.items()
+    }

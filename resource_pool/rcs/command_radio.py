@@ -70,7 +70,7 @@ class CommandRadio(ResourceController[RcParameters]):
     """Interleaves packets by network id; when an ARC is disconnected, its robots get a last, safe packet."""
 
     commands = LoadPacket
-    driver_kind = "radio"
+    driver_kind, driver_protocol = "radio", RadioDriver
     outlasts_s = COMMAND_TIMEOUT_S  # robots without packets stop and switch off after this time
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

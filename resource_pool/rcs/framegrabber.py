@@ -68,7 +68,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     shares_process = False
     alike_most = 5  # measured: they share one renderer and its thread, and draw for a fifth of a core
     commands = Tune
-    driver_kind = "framegrabber"
+    driver_kind, driver_protocol = "framegrabber", FramegrabberDriver
     closed_most_s = 5.0  # chosen: a camera starts within two; its RC waits for no driver call
     driver_parameters = frozenset({"options", "frame_rate_hz"})
 

@@ -34,6 +34,7 @@ class Scout(RobotRc[RobotParameters]):
     """Two wheels and a spring foot."""
 
     body_class = "scout_model.scout:Scout"
+    driver_protocol = ScoutProtocol
     commands = Move | Drive | Halt | Jump | SwitchTransmitter
     reports = ScoutReports
     camera = CameraForm(

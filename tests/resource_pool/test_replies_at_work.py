@@ -84,8 +84,11 @@ class SilentProtocol:
 
     def __init__(self, site: DriverSite) -> None:
         self._protocol = SimulatedScoutProtocol(site)
-        for word in ("clip_wheel_speed", "drive", "halt", "jump", "transmitter", "safe"):
-            setattr(self, word, getattr(self._protocol, word))
+
+    def __getattr__(self, word: str) -> object:
+        if word == "read":
+            raise AttributeError(word)
+        return getattr(self._protocol, word)
 
 
 class ReportsNothing(Scout):

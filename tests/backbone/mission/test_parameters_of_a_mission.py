@@ -22,6 +22,7 @@ from backbone.mission.tables import parameter_value
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]
 SMALL = (HERE / "small.xml").read_text()
+PROTOCOL = "resource_pool.drivers.simulated:SimulatedScoutProtocol"
 OWN_TYPE = '    <type name="own" class="{path}" subsystem="mission_control"/>\n  </types>'
 GOOD = """
 import msgspec
@@ -232,7 +233,8 @@ def test_bytes_are_read_without_running_a_module_if_the_caller_says_which_classe
 def test_a_parameter_under_a_driver_that_nobody_knows_here_is_not_judged(tmp_path: Path) -> None:
     grabber = '<resource type="framegrabber" name="grabber">'
     given = '<parameter name="device" value="/dev/video0"/><parameter name="frame_rate_hz" value="fast"/>'
-    text = SMALL.replace(grabber, f'{grabber[:-1]} driver="v4l2">{given}')
+    text = SMALL.replace(grabber, f'{grabber[:-1]} driver="my_lab.v4l2:Grabber">{given}')
+    text = text.replace('address="127.0.0.1"', 'address="192.0.2.1"')
     [fault] = faults_in(tmp_path, text)
     assert fault.message == "frame_rate_hz='fast' is illegal"
 
@@ -309,6 +311,8 @@ def test_the_reference_of_behaviors_has_the_parameters_of_their_classes_with_the
 
 def test_the_only_robot_of_a_mission_needs_its_network_id_too(tmp_path: Path) -> None:
     smallest = (ROOT / "docs" / "examples" / "smallest.xml").read_text()
-    without = re.sub(r" *<parameter .*\n", "", smallest).replace('name="scout1">', 'name="scout1" driver="serial">')
+    without = re.sub(r" *<parameter .*\n", "", smallest).replace(
+        'name="scout1">', f'name="scout1" driver="{PROTOCOL}">'
+    )
     faults = faults_in(tmp_path, re.sub(r" *<robot .*\n", "", without))
     assert [fault.message for fault in faults] == ["scout scout1 lacks parameter network_id"]

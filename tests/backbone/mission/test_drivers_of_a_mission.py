@@ -1,0 +1,91 @@
+"""A driver that does not exist, or lacks a method, is refused before anything starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mission_files import changed, faults_in, read_text
+
+RADIO = '<resource type="command_radio" name="radio" sharable="true" capacity="0.5"'
+GRABBER = '<resource type="framegrabber" name="grabber"'
+SCOUT = '<resource type="scout" name="scout1" features="camera"'
+ID = '<parameter name="network_id" value="1"/>'
+BODY = '    <robot name="scout1" x-m="1" y-m="1"/>\n'
+OWN = """
+import msgspec
+class Options(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    port: str
+class Whole:
+    options_type = Options
+    async def open(self): ...
+    async def transmit(self, network_id, payload, **named): ...
+    async def close(self): ...
+class Half:
+    async def open(self): ...
+    async def transmit(self, network_id, payload, **named): ...
+NONE = 3
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "own_radio.py").write_text(OWN)
+    (tmp_path / "own_broken.py").write_text("import no_such_module\nclass Radio: ...")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("before", "driver", "message"),
+    [
+        (RADIO, "simulatd", "command_radio has no driver 'simulatd' (did you mean 'simulated'?)"),
+        (GRABBER, "growth", "framegrabber has no driver 'growth'"),
+        (SCOUT, "growth", "scout has no driver 'growth'"),
+        (RADIO, "own_rdio:Whole", "own_rdio:Whole: no module own_rdio"),
+        (RADIO, "own_radio:Whle", "own_radio:Whle: no class Whle in own_radio (did you mean 'Whole'?)"),
+        (RADIO, "own_radio:Half", "radio cannot use this driver: radio driver: own_radio:Half lacks close"),
+        (RADIO, "own_radio:NONE", "radio cannot use this driver: radio driver: own_radio:NONE is no class"),
+        (
+            RADIO,
+            "own_broken:Radio",
+            "radio cannot use this driver: radio driver: own_broken:Radio: No module named 'no_such_module'",
+        ),
+        (SCOUT, "resource_pool.drivers.interface:NoDevice", None),
+    ],
+)
+def test_a_driver_that_cannot_work_is_refused(own: Path, before: str, driver: str, message: str | None) -> None:
+    body = [(BODY, "")] if before == SCOUT else []
+    [fault] = faults_in(own, changed((before, f'{before} driver="{driver}"'), *body))
+    lacks = "clip_wheel_speed, drive, halt, jump, safe, transmitter"
+    assert fault.message == (message or f"scout1 cannot use this driver: robot driver: {driver} lacks {lacks}")
+    assert fault.remedy
+
+
+def test_a_robots_driver_is_the_one_in_its_parameter_protocol(own: Path) -> None:
+    def scout(protocol: str) -> str:
+        given = f'<parameter name="protocol" value="{protocol}"/>'
+        return changed((SCOUT, f'{SCOUT} driver="serial"'), (ID, ID + given), (BODY, ""))
+
+    read_text(own, scout("resource_pool.drivers.simulated:SimulatedScoutProtocol"))
+    [fault] = faults_in(own, scout("growth"))
+    assert fault.message == "scout has no driver 'growth'"
+    assert scout("growth").splitlines()[fault.line - 1][fault.column - 1 :].startswith("value")
+
+
+def test_options_of_a_driver_of_ones_own_are_checked(own: Path) -> None:
+    def radio(option: str) -> str:
+        whole = f'{RADIO} driver="own_radio:Whole"'
+        return changed((f"{RADIO}/>", f'{whole}><parameter name="{option}" value="/dev/ttyUSB0"/></resource>'))
+
+    read_text(own, radio("port"))
+    faults = [fault.message for fault in faults_in(own, radio("prt"))]
+    assert faults == [
+        "command_radio radio lacks parameter port",
+        "command_radio has no parameter 'prt' (did you mean 'port'?)",
+    ]
+
+
+def test_drivers_on_other_machines_are_not_looked_for_here(own: Path) -> None:
+    elsewhere = ('address="127.0.0.1"', 'address="192.0.2.1"')
+    read_text(own, changed(elsewhere, (RADIO, f'{RADIO} driver="not_here.at_all:Radio"')))
