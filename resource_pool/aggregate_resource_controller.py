@@ -116,7 +116,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._slice = ArcSlice(bus, clock, self._gate, self._owner, longest_s=self._longest_s, note=note)
         self._owner_watch = OwnerWatch(bus, clock, self._owner, state=self._arc_state, end=self.end, note=note)
         self._manager_watch = ManagerWatch(bus)
-        self._able = ArcCommands(launch.type, self.commands)
+        self._able = ArcCommands(launch.type, self.commands, self.roles, self.body)
         self._offering: asyncio.Task[None] | None = None
         self._commands = self._refused = 0
 
@@ -135,7 +135,7 @@ class AggregateResourceController(Component[ArcParameters]):
         return Abilities(
             gives_pictures=cls.gives_pictures,
             body=cls.body,
-            commands=ArcCommands(cls.__name__, cls.commands).forms(),
+            commands=ArcCommands(cls.__name__, cls.commands, cls.roles, cls.body).forms(),
         )
 
     @classmethod

@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from backbone.component.abilities import CommandForm, command_form
+from backbone.errors import Refusal
 from resource_pool.commands import OF_THE_BASE, Command, command_of
 from resource_pool.messages import GiveCommand, NoSuchAction
+
+
+class WrongRoles(Refusal):
+    """The class of an ARC declares roles that do not fit each other."""
+
+    code = "arc.roles"
+    remedy = "Mend roles, commands or body of the class."
 
 
 class ArcCommands:
@@ -15,10 +23,27 @@ class ArcCommands:
     Args:
         kind: The type of the ARC.
         able: Command → role of the RC that carries it out. If there are several roles, the command names one.
+        roles: All roles of its set.
+        body: Role of the RC that has a body; empty: none.
+
+    Raises:
+        WrongRoles: The roles are one text, or one of the others is not among them.
     """
 
-    def __init__(self, kind: str, able: Mapping[type[Command], str | Sequence[str]]) -> None:
+    def __init__(
+        self,
+        kind: str,
+        able: Mapping[type[Command], str | Sequence[str]],
+        roles: Mapping[str, str] | Sequence[str],
+        body: str,
+    ) -> None:
         self._kind, self._able = kind, able
+        if isinstance(roles, str):
+            raise WrongRoles(f"{kind}: roles is a text; write a tuple, with a comma: ({roles!r},)")
+        named = [("body", body), *((one.__name__, role) for one in able for role in self._roles_of(one))]
+        for what, role in named:
+            if role and role not in roles:
+                raise WrongRoles(f"{kind}: {what} names the role {role!r}; its roles are: {', '.join(roles) or 'none'}")
 
     def forms(self) -> list[CommandForm]:
         """Return each command in the form that consoles show."""

@@ -41,6 +41,22 @@ def _check_roles(needs: Sequence[Element], report: Report) -> None:
             )
 
 
+def check_commands(component_type: Element, tables: Tables, report: Report) -> None:
+    """Report a command that an ARC passes on to a kind of RC that does not obey it."""
+    facts, needs = tables.facts_of(component_type.text("name")), tables.needs(component_type.text("name"))
+    for command in [] if facts is None else facts.abilities.commands:
+        for role in command.roles:
+            rc = tables.facts_of(needs.get(role, ""))
+            obeyed = [] if rc is None else [one.word for one in rc.abilities.commands]
+            if rc is not None and command.word not in obeyed:
+                kind = needs[role]
+                report.fault(
+                    component_type.place_of("class"),
+                    f"{component_type.text('name')} passes {command.word} on to its {role}, and no {kind} obeys it",
+                    f"Declare it in commands of the class of {kind}, which obeys: {listed(obeyed) or 'nothing'}",
+                )
+
+
 def check_needs(component_type: Element, tables: Tables, report: Report) -> None:
     """Report what a type needs or uses and no type of resource is."""
     needs = component_type.all("needs")

@@ -1,0 +1,69 @@
+"""Roles of an ARC's class that do not fit each other, or its RCs, are refused before anything starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+from backbone.mission.class_probe import facts_of
+from backbone.mission.reader import MissionInvalid, read_mission
+from resource_pool.aggregate_resource_controller import AggregateResourceController
+from resource_pool.arc_commands import ArcCommands, WrongRoles
+from resource_pool.commands import Jump
+from resource_pool.rcs.skeleton import Shine
+
+
+class LampArc(AggregateResourceController):
+    roles: ClassVar[Any] = ("lamp",)
+    commands: ClassVar[Any] = {Shine: "lamp"}
+    body = "lamp"
+
+
+class OneText(LampArc):
+    roles = "lamp"
+
+
+class Misspelt(LampArc):
+    commands = {Shine: ["lamp", "lmap"]}
+
+
+class OtherBody(LampArc):
+    body = "scout"
+
+
+class JumpingLamp(LampArc):
+    commands = {Jump: "lamp"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        (OneText, "OneText: roles is a text; write a tuple, with a comma: ('lamp',)"),
+        (Misspelt, "Misspelt: Shine names the role 'lmap'; its roles are: lamp"),
+        (OtherBody, "OtherBody: body names the role 'scout'; its roles are: lamp"),
+    ],
+)
+def test_roles_that_do_not_fit_each_other_are_refused_by_check_and_at_the_start(
+    kind: type[AggregateResourceController], told: str
+) -> None:
+    assert facts_of(f"{__name__}:{kind.__name__}").failure == told
+    with pytest.raises(WrongRoles):
+        ArcCommands("own", kind.commands, kind.roles, kind.body)
+
+
+def test_a_command_that_no_rc_of_its_role_obeys_is_refused_by_check(tmp_path: Path) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text(
+        '<mission name="m" priority="1"><types>'
+        '<type name="lamp" class="resource_pool.rcs.skeleton:Lamp" subsystem="resource_pool"/>'
+        f'<type name="own" class="{__name__}:JumpingLamp" subsystem="resource_pool"><needs type="lamp"/></type>'
+        '</types><resources><resource type="lamp" name="lamp1" driver="resource_pool.rcs.skeleton:PaintedLamp">'
+        '<parameter name="color" value="red"/></resource></resources></mission>'
+    )
+    with pytest.raises(MissionInvalid) as caught:
+        read_mission(file)
+    [fault] = caught.value.faults
+    assert fault.message == "own passes jump on to its lamp, and no lamp obeys it"
+    assert fault.remedy == "Declare it in commands of the class of lamp, which obeys: shine"
