@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import msgspec
 
+from backbone.component.class_faults import class_faults
 from mission_control.modules.ports import ModulePorts, Ports, WrongDeclaration, ports_of, type_name
 
 if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
@@ -141,6 +142,8 @@ def _check_update(kind: type[Module]) -> None:
             f"update of {type_name(kind)}{wrong}",
             remedy="Write it as 'def update(self, inputs)'; it returns the outputs.",
         )
+    for fault in class_faults(kind):
+        raise WrongDeclaration(f"{type_name(kind)}: {fault}", remedy="Mend the class.")
 
 
 def default_name(kind: type[Module]) -> str:

@@ -95,12 +95,18 @@ class Bare(Module):
         return Bare.Outputs()
 
 
+class NeverReady(Bare):
+    async def is_ready(self) -> bool:  # type: ignore[override]
+        return True
+
+
 @pytest.mark.parametrize(
     ("kind", "word"),
     [
         (Undeclared, "update of .*:Undeclared is not declared"),
         (Awaiting, "update of .*:Awaiting is an async function"),
         (ByPort, "update of .*:ByPort: missing a required argument: 'right'"),
+        (NeverReady, ".*:NeverReady: is_ready is an 'async def'; write it as a 'def'"),
     ],
 )
 def test_an_update_that_no_unit_can_call_is_refused_before_the_first_round(kind: type[Module], word: str) -> None:
