@@ -101,5 +101,6 @@ def known_classes(root: Element) -> dict[str, ClassFacts]:
     paths = {one.text("class") for one in section(root, "types")}
     asked = [path for path in sorted(paths - known.keys()) if CLASS_PATH.fullmatch(path) and not class_path_fault(path)]
     tables = Tables.of(root, {**known, **ask_classes(asked)})
-    drivers = [one for one in map(tables.driven, section(root, "resources")) if one]
-    return {**tables.classes, **ask_classes(drivers)}
+    drivers = map(tables.driven, section(root, "resources"))
+    bodies = map(tables.embodied, () if tables.world is None else tables.world.all("robot"))
+    return {**tables.classes, **ask_classes([one for one in (*drivers, *bodies) if one])}

@@ -25,6 +25,8 @@ ROOM = "room"  # the parameter with the room, for classes that have it
 FLOOR_PLAN = "floor_plan"  # their parameter for a picture of the floor: in the file its name, later its content
 NETWORK_ID = "network_id"  # the parameter by which the radio distinguishes robots
 
+SHIPPED_BODIES = ("scout_model.", "resource_pool.")  # packages whose bodies tests have judged
+
 
 @dataclass(frozen=True)
 class Tables:
@@ -93,6 +95,16 @@ class Tables:
     def facts_with_driver(self, resource: Element) -> ClassFacts | None:
         """Return the facts of the class of a resource, and of its driver where this is known."""
         return self.classes.get(self.driven(resource)) or self.facts_of(resource.text("type"))
+
+    def embodied(self, robot: Element) -> str:
+        """Return class path of the world and of a robot's own body, for ``ask_classes``; empty: shipped or not here."""
+        kind = self.resources[robot.text("name")].text("type") if robot.text("name") in self.resources else ""
+        facts = self.facts_of(kind)
+        body = robot.text("class") or ("" if facts is None else facts.abilities.body_class)
+        is_own = CLASS_PATH.fullmatch(body) and not body.startswith(SHIPPED_BODIES)
+        if self.world is None or self.world.text("type") not in self.types or not self.is_only_here or not is_own:
+            return ""
+        return "" if class_path_fault(body) else f"{self.types[self.world.text('type')].text('class')} {body}"
 
     @property
     def is_only_here(self) -> bool:

@@ -199,6 +199,9 @@ def _check_path(target: Element, report: Report) -> None:
 def _check_classes(world: Element, tables: Tables, report: Report) -> None:
     for robot in world.all("robot"):
         class_path = robot.text("class")
+        facts = tables.classes.get(tables.embodied(robot))
+        if facts is not None and facts.failure:
+            report.fault(robot.place_of("class"), facts.failure, "Give the class what the message names")
         if not class_path:
             _check_body(robot, tables, report)
             continue

@@ -134,3 +134,28 @@ def test_what_a_carrier_and_a_table_are_is_what_the_world_takes_them_for() -> No
     assert world_checks.CARRIER_PLACES == dimensions.CARRIER_PLACES
     just_a_table = Furniture("t", 1.0, 1.0, 0.101, 0.101, 0.031, "table")
     assert World(WorldDescription(9.0, 6.0, furniture=[just_a_table])).mjcf
+
+
+@pytest.mark.parametrize("has_class", [True, False])
+def test_a_body_that_lacks_a_method_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, has_class: bool
+) -> None:
+    """It is named in the world, or by the class of the robot's RC."""
+    monkeypatch.syspath_prepend(tmp_path)
+    name = f"own_body_{has_class}".lower()
+    (tmp_path / f"{name}.py").write_text(
+        "from resource_pool.rcs.scout import Scout\n"
+        f"class Rc(Scout):\n    body_class = '{name}:Body'\n"
+        "class Body:\n    frequency, motors = '', 0.0\n    def hear(self, payload, now_s): ...\n"
+    )
+    no_world = 'name="simulated_world" class="backbone.component.component:Component"'
+    text = SMALL.replace(no_world, 'name="simulated_world" class="resource_pool.simulated_world:SimulatedWorld"')
+    robot = '<robot name="scout1" '
+    if has_class:
+        text = text.replace(robot, f'{robot}class="{name}:Body" ')
+    else:
+        text = text.replace('"resource_pool.rcs.scout:Scout"', f'"{name}:Rc"')
+    with pytest.raises(MissionInvalid) as caught:
+        world_of(tmp_path, text)
+    told = {fault.message for fault in caught.value.faults}
+    assert told == {f"{name}:Body is no kind of robot: it lacks body_mjcf, controls, counts"}
