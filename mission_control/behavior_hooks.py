@@ -6,6 +6,7 @@ Each hook documents when it is called, its purpose, and what it must not do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 from mission_control.behavior_tree import ArcNeed
 from mission_control.children import Children, Decision
@@ -15,6 +16,14 @@ from resource_pool.arc_client import Frame
 
 class BehaviorHooks:
     """Hooks of a behavior: event handlers and decisions."""
+
+    needs_arc: ClassVar[str] = ""
+    """Kind of ARC like which the behavior needs one. A class that overrides ``see`` and sets no kind needs pictures."""
+
+    def __init_subclass__(cls, **kwargs: object) -> None:
+        super().__init_subclass__(**kwargs)
+        if "see" in vars(cls) and not cls.needs_arc and "needs_arc" not in vars(cls):
+            cls.needs_arc = "capture"
 
     async def start(self) -> None:
         """Prepare.

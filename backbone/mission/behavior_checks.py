@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from backbone.component.abilities import NO_ABILITIES
 from backbone.component_database.messages import Multiplicity
 from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.mission.document import Element
@@ -79,6 +80,7 @@ def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
         return
     if not facts.may_claim and (arc := behavior.first("arc")) is not None:
         report.fault(arc.place, f"{behavior.text('type')} {behavior.text('name')} needs no ARC", "Remove it")
+    _check_needed(behavior, facts.needs_arc, tables, report)
     if facts.children is None:
         return
     (fewest, most), given = facts.children, behavior.all("behavior")
@@ -90,6 +92,26 @@ def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
         f"{behavior.text('type')} {behavior.text('name')} has {counted(len(given), 'behavior')} inside",
         f"Give it {wanted}",
     )
+
+
+def _check_needed(behavior: Element, needed: str, tables: Tables, report: Report) -> None:
+    """Report a behavior without the ARC, or without the pictures, that its class needs."""
+    arc, like = behavior.first("arc"), tables.facts_of(needed)
+    if needed and arc is None:
+        report.fault(
+            behavior.place,
+            f"{behavior.text('type')} {behavior.text('name')} has no ARC, and needs one",
+            f'Write into it <arc kind="{needed}" minimum-runtime-s="5"/>, or one of a similar kind',
+        )
+    claimed = None if arc is None else tables.facts_of(arc.text("kind"))
+    if arc is None or claimed is None or like is None or claimed.abilities == NO_ABILITIES:
+        return
+    if like.abilities.gives_pictures and not claimed.abilities.gives_pictures:
+        report.fault(
+            arc.place_of("kind"),
+            f"an ARC of kind {arc.text('kind')} gives no pictures, which {behavior.text('name')} needs",
+            f'Write kind="{needed}", or another kind with pictures',
+        )
 
 
 def _check_runtime(behavior: Element, arc: Element, report: Report) -> None:

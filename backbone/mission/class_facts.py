@@ -98,6 +98,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
         has_rules: Whether it has rules for its parameters besides their types; only the class itself can check these.
         children: Fewest and most children of a behavior; None: any number.
         may_claim: False: a behavior of this class has no ARC.
+        needs_arc: Kind of ARC like which a behavior of this class needs one; empty: it needs none.
         failure: Why the facts are unknown; empty: they are known.
         abilities: The commands that its components obey, and the values that they report.
         given: Parameters that other elements and attributes of the mission file set.
@@ -112,6 +113,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     has_rules: bool = False
     children: tuple[int, int] | None = None
     may_claim: bool = True
+    needs_arc: str = ""
     failure: str = ""
     abilities: Abilities = NO_ABILITIES
     given: tuple[str, ...] = ()

@@ -53,6 +53,7 @@ def _described(found: type[Component[Any]], driver: str) -> ClassFacts:
         _has_rules(found.parameters_type),
         children=getattr(found, "children_allowed", None),
         may_claim=getattr(found, "may_claim", True),
+        needs_arc=getattr(found, "needs_arc", ""),
         abilities=found.abilities(),
         given=tuple(sorted(found.given_elsewhere)),
         shares_process=found.shares_process,

@@ -55,8 +55,7 @@ class Driver(Behavior[D]):
     Derive, override ``drive_on`` instead of ``act``, and keep all progress on ``self`` or in a plain object there.
     """
 
-    needs_arc: ClassVar[str] = "drive"
-    """Kind of ARC that the refusal names if the behavior has none."""
+    needs_arc = "drive"
     never: ClassVar[frozenset[str]] = frozenset({"world.unknown_body", "localizer.unknown_body", "wire.unknown"})
     """Codes of permanent refusals: a retry would fail again."""
     spread_m = 0.0

@@ -26,6 +26,7 @@ class Skeleton(Behavior[SkeletonParameters]):
     """Turns on the spot a few times, one second each, then has succeeded."""
 
     parameters_type = SkeletonParameters
+    needs_arc = "drive"
     turned = 0  # survives suspensions, as all state on self does
 
     async def act(self) -> None:

@@ -1,0 +1,52 @@
+"""A behavior that could do nothing, because it gets no ARC or no pictures, is refused before anything starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mission_files import MISSION_XML, faults_in
+
+from backbone.mission.class_probe import facts_of
+from mission_control.behavior import Behavior, BehaviorParameters
+from resource_pool.arc_client import Frame
+
+MISSION = MISSION_XML.read_text()
+ARC = '<arc kind="capture" minimum-runtime-s="5" period-s="0.1"><wish type="scout" name="scout1"/></arc>'
+GO_TO = (
+    '<behavior type="go_to" name="go" priority="1"><parameter name="x_m" value="1"/><parameter name="y_m" value="1"/>'
+    '<parameter name="localizer" value="localizer"/></behavior></behaviors>'
+)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        (ARC, "", "watch_for_motion watch-scout1 has no ARC, and needs one"),
+        (
+            ARC,
+            ARC.replace("capture", "drive"),
+            "an ARC of kind drive gives no pictures, which watch-scout1 needs",
+        ),
+        ("</behaviors>", GO_TO, "go_to go has no ARC, and needs one"),
+    ],
+)
+def test_a_behavior_without_what_it_needs_is_refused(tmp_path: Path, before: str, after: str, message: str) -> None:
+    assert before in MISSION
+    [fault] = faults_in(tmp_path, MISSION.replace(before, after))
+    assert fault.message == message
+    assert 'kind="' in fault.remedy
+
+
+class Watcher(Behavior[BehaviorParameters]):
+    def see(self, frame: Frame) -> None:
+        pass
+
+
+class LooksSometimes(Watcher):
+    needs_arc = ""
+
+
+def test_a_class_of_ones_own_that_sees_needs_pictures_unless_it_says_otherwise() -> None:
+    assert facts_of(f"{__name__}:Watcher").needs_arc == "capture"
+    assert facts_of(f"{__name__}:LooksSometimes").needs_arc == ""
