@@ -8,7 +8,7 @@ from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.mission.document import Element
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.parameter_checks import check_class_parameters
-from backbone.mission.reading_checks import check_readings, check_vision
+from backbone.mission.reading_checks import check_named, check_readings
 from backbone.mission.report import Report, listed
 from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
@@ -46,7 +46,7 @@ def check_behaviors(tables: Tables, report: Report) -> None:
         check_class_parameters(behavior, TREE_PARAMETERS, tables, report)
         _check_inside(behavior, tables, report)
         check_readings(behavior, tables, report)
-        check_vision(behavior, tables, report)
+        check_named(behavior, tables, report)
     sets = _Sets(tables)
     arc_kinds = [name for name in tables.types if tables.needs(name)]
     for behavior, arc in tables.claims():

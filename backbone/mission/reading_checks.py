@@ -1,4 +1,4 @@
-"""Checks that conditions on readings name a resource and a value that it reports, and that watchers name a unit.
+"""Checks of parameters that name others: components, bodies, units, and the readings of a resource.
 
 Pure: elements and facts in, faults out. A class without known facts is not checked.
 """
@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from backbone.component.abilities import FieldForm, ValueKind
+from backbone.creator.messages import creator_name
+from backbone.mission.class_facts import shipped_classes
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
-from backbone.mission.tables import Tables, parameter_value
+from backbone.mission.tables import CORE_SERVICES, Tables, parameter_value
 from backbone.naming import Subsystem, is_legal
 
 CONDITION = "mission_control.behaviors.condition:MessageCondition"
 """Class of the behaviors that check conditions on messages."""
-WATCHER = "mission_control.behaviors.watch_for_motion:WatchForMotion"
-"""Class of the behaviors whose pictures a unit may evaluate, named in their parameter ``vision``."""
 READINGS = "Readings"
 """Value of their parameter ``message`` for conditions on measurements of an RC."""
 VALUES = "values."
@@ -62,17 +62,44 @@ def check_readings(behavior: Element, tables: Tables, report: Report) -> None:
         )
 
 
-def check_vision(behavior: Element, tables: Tables, report: Report) -> None:
-    """Report a watcher that names an unknown unit for its pictures."""
-    kind = tables.types.get(behavior.text("type"))
+def check_named(behavior: Element, tables: Tables, report: Report) -> None:
+    """Report parameters that name a component, body or unit that the mission does not have."""
+    facts = tables.facts_of(behavior.text("type"))
     given = {one.text("name"): one for one in behavior.all("parameter")}
-    name, units = _text(given, "vision"), [unit.text("name") for unit in tables.units]
-    if kind is not None and kind.text("class") == WATCHER and name and name not in units:
-        report.fault(
-            given["vision"].place_of("value"),
-            f"no unit is named {quoted(name)}{report.hint(name, units)}",
-            f"There is: {listed(units)}" if units else "Write the unit into <modules>, or leave the parameter out",
-        )
+    for one in () if facts is None else facts.parameters:
+        value, what = _text(given, one.name), one.schema.get("names", "")
+        is_judged = value and what and one.accepts(parameter_value(value))
+        known = _nameable(what, value, _text(given, "localizer"), tables) if is_judged else None
+        name = value.rpartition("/")[2]
+        if known is not None and name not in known and _text(given, "message") != READINGS:
+            report.fault(
+                given[one.name].place_of("value"),
+                f"no {'component' if what == 'source' else what} is named {quoted(value)}{report.hint(name, known)}",
+                f"There is: {listed(known)}" if known else f"Add it to the mission, or write another {one.name}",
+            )
+
+
+def _nameable(what: str, value: str, localizer: str, tables: Tables) -> list[str] | None:
+    """Return the names that a parameter of this kind may have; None: it may name what this file does not show."""
+    world = [] if tables.world is None else [tables.world.text("name")]
+    units = [unit.text("name") for unit in tables.units]
+    arcs = [f"{behavior.text('name')}-{arc.text('kind')}" for behavior, arc in tables.claims()]
+    pool, minds = [*tables.resources, *world, *arcs], [*(one.text("name") for one in tables.behaviors), *units]
+    subsystem, _, name = value.rpartition("/")
+    if what == "unit":
+        return units
+    if what == "body":
+        kind = tables.types.get(tables.resources[localizer].text("type")) if localizer in tables.resources else None
+        is_shipped = localizer in world or (kind is not None and kind.text("class") in shipped_classes())
+        bodies = [] if tables.world is None else [one.text("name") for one in tables.world.children if one.text("name")]
+        return [*dict.fromkeys((*(robot.text("name") for robot in tables.robots()), *bodies))] if is_shipped else None
+    if what == "source" and not (subsystem or is_legal(name)):
+        return None  # any, or a text that the class refuses
+    if not subsystem:
+        return pool if what == "component" else [*pool, *minds, *CORE_SERVICES, *map(creator_name, tables.hosts)]
+    if subsystem == Subsystem.RESOURCE_POOL:
+        return pool
+    return minds if subsystem == Subsystem.MISSION_CONTROL else None
 
 
 def _check_limits(given: Mapping[str, Element], rc: str, form: FieldForm, report: Report) -> None:

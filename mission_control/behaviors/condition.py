@@ -16,7 +16,9 @@ import logging
 import operator
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta
 
 from backbone.creator.messages import ProcessFell
 from backbone.errors import LinkError, Refusal
@@ -107,7 +109,7 @@ class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``MessageCondition``.
 
     Attributes:
-        source: The component: its name, or its address; '*' for any.
+        source: The component: its name, or its address; '*' for any. A console's address must be written.
         message: The event, such as MotionSeen; BehaviorState for a behavior's report; Readings for what an RC measures;
             or the class of an event of your own, as package.module:Class.
         field: Field of the message, such as region.width_px, payload.waypoints_reached or values.battery_share; empty:
@@ -119,7 +121,7 @@ class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
             and failure; readings that are not there within 5 s are a failure.
     """
 
-    source: str = ANY
+    source: Annotated[str, Meta(extra_json_schema={"names": "source"})] = ANY
     message: str
     field: str = ""
     above: float | None = None

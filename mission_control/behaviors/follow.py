@@ -17,7 +17,7 @@ from backbone.errors import Refusal
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
-from mission_control.behaviors.motion import DrivingSpeed, FloorPoint, NamedComponent
+from mission_control.behaviors.motion import DrivingSpeed, FloorPoint, NamedBody, NamedComponent
 from mission_control.behaviors.way import keep_distance
 
 TOLERANCE_SHARE = 0.1  # chosen: of the distance; with less the robot would move all the time
@@ -40,7 +40,7 @@ class FollowParameters(BehaviorParameters, frozen=True, kw_only=True):
         speed_m_s: Fastest speed.
     """
 
-    target: NamedComponent
+    target: NamedBody
     localizer: NamedComponent
     distance_m: Annotated[float, msgspec.Meta(ge=0.2, le=10)] = 0.5
     speed_m_s: DrivingSpeed = 0.2

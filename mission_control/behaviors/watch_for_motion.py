@@ -56,7 +56,7 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
     frame_rate_hz: Annotated[float, msgspec.Meta(gt=0)] = 15.0
     clean_share: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.75
     seed: int = 0
-    vision: str = ""
+    vision: Annotated[str, msgspec.Meta(extra_json_schema={"names": "unit"})] = ""
 
 
 class WatchForMotion(Behavior[WatchParameters]):
