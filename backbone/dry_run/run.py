@@ -18,7 +18,7 @@ import msgspec
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.inventory import Inventory
 from backbone.dependency_database.messages import FindRcs
-from backbone.errors import Refusal, code_of
+from backbone.errors import BackboneError, Refusal, code_of, complaint
 from backbone.mission.behavior_orders import PathStep
 from backbone.mission.model import ArcWish, BehaviorDescription, MissionDescription
 from backbone.naming import Subsystem, address
@@ -29,7 +29,7 @@ from backbone.rc_manager.service import TOLERANCE_S
 from backbone.scheduling.claims import scheduling_request
 from backbone.scheduling.events import Requested
 from backbone.scheduling.explain.answers import Answers
-from backbone.scheduling.own_planner import load_planner
+from backbone.scheduling.own_planner import MEND, WrongPlanner, load_planner
 from backbone.scheduling.rehearsal import Rehearsal, Timetable
 from backbone.scheduling.requests import SchedulingRequest, Usage
 from backbone.scheduling.rules import SchedulingRules
@@ -130,10 +130,24 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
 
     Args:
         for_s: Mission seconds, at least 0; the last branch is tried for at most its own time.
+
+    Raises:
+        WrongPlanner: The mission's own planner cannot be loaded, or failed at work.
     """
+    rules = msgspec.convert(description.core_parameters("rc_manager"), SchedulingRules)
+    try:
+        return _dry_run(description, rules, for_s)
+    except (AssertionError, BackboneError):
+        raise
+    except Exception as error:
+        if not rules.planner:
+            raise
+        raise WrongPlanner(f"{rules.planner}: {complaint(error)}", remedy=MEND) from error
+
+
+def _dry_run(description: MissionDescription, rules: SchedulingRules, for_s: float) -> DryRun:
     placed = placements(description)
     hosts = {one.name: one.host for one in placed}
-    rules = msgspec.convert(description.core_parameters("rc_manager"), SchedulingRules)
     manager = ScheduleManager(
         rules,
         tolerance_s=TOLERANCE_S,

@@ -122,7 +122,7 @@ def _check_core(tables: Tables, report: Report) -> None:
                     "Remove one; creator runs once on each host, every other core service once in the mission",
                 )
         check_host(service, tables, report)
-        check_service_parameters(service, report)
+        check_service_parameters(service, tables, report)
         main = _main_host(tables)
         if name in CORE_SERVICES and name != CREATOR and where in tables.hosts and where != main:
             report.fault(

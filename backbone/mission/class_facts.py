@@ -15,6 +15,7 @@ import msgspec
 from backbone.component.abilities import NO_ABILITIES, Abilities
 
 SHIPPED = "shipped_classes.json"
+PLANNER = "planner"  # the RC manager's parameter that names a planner of one's own
 
 _LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
 _META = {"minimum": "ge", "exclusiveMinimum": "gt", "maximum": "le", "exclusiveMaximum": "lt"}

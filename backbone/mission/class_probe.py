@@ -16,15 +16,21 @@ from backbone.component.component import Component
 from backbone.component.field_docs import field_docs
 from backbone.errors import Refusal
 from backbone.mission.arranged import Arranged, UnitsQuestion
-from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
+from backbone.mission.class_facts import PLANNER, ClassFacts, ParameterFacts, Question, parameters_of
+from backbone.scheduling.own_planner import load_planner
 
 BY_CLASS_ALONE = ("multipleOf", "format", "contentEncoding")  # rules of a schema that ``ParameterFacts`` lacks
 ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; a hang or kill of their process ends no more
 
 
 def facts_of(asked: str) -> ClassFacts:
-    """Return the facts of a class, or of a class with a driver, as ``driven_by`` writes it; imports their modules."""
+    """Return the facts of a class, a class with its driver or body, or a planner, as ``Tables`` writes the question.
+
+    Imports the modules into this process.
+    """
     class_path, _, driver = asked.partition(" ")
+    if class_path == PLANNER:
+        return ClassFacts(failure=_planner_fault(driver))
     module, _, name = class_path.partition(":")
     try:
         found = getattr(importlib.import_module(module), name)
@@ -40,6 +46,14 @@ def facts_of(asked: str) -> ClassFacts:
         return ClassFacts(failure=error.detail)
     except Exception as error:  # a type of a parameter without a schema, or a hook of the class with a bug
         return ClassFacts(failure=f"its parameters or abilities cannot be listed: {type(error).__name__}: {error}")
+
+
+def _planner_fault(class_path: str) -> str:
+    try:
+        planner: object = load_planner(class_path)
+    except Refusal as error:
+        return error.detail
+    return "; ".join(f"{class_path}: {fault}" for fault in class_faults(planner)) if isinstance(planner, type) else ""
 
 
 def _described(found: type[Component[Any]], driver: str) -> ClassFacts:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
+from backbone.mission.class_facts import PLANNER, ClassFacts, ParameterFacts, Question, parameters_of
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
@@ -26,12 +26,11 @@ from backbone.naming import is_legal
 from backbone.scheduling.rules import SchedulingRules
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")  # the schema refuses other names
-PLANNER = "planner"
 SERVICE_PARAMETERS = {"rc_manager": parameters_of(SchedulingRules)}
 """Core service → parameters that the file may set."""
 
 
-def check_service_parameters(service: Element, report: Report) -> None:
+def check_service_parameters(service: Element, tables: Tables, report: Report) -> None:
     """Report parameters that the core service does not have, that occur twice, or that it would refuse."""
     kind = service.text("type")
     if kind not in CORE_SERVICES:
@@ -41,7 +40,9 @@ def check_service_parameters(service: Element, report: Report) -> None:
     _check_given(service, kind, known, (), report, "Remove it; only the rc_manager's rules can be set")
     for parameter in service.all("parameter"):
         if parameter.text("name") == PLANNER and CLASS_PATH.fullmatch(parameter.text("value")):
-            check_class_path(parameter, "value", report)
+            facts = tables.classes.get(tables.planned(service))
+            if check_class_path(parameter, "value", report) and facts is not None and facts.failure:
+                report.fault(parameter.place_of("value"), facts.failure, "Mend the planner's class")
 
 
 def check_class_parameters(element: Element, reserved: Collection[str], tables: Tables, report: Report) -> None:

@@ -103,4 +103,5 @@ def known_classes(root: Element) -> dict[str, ClassFacts]:
     tables = Tables.of(root, {**known, **ask_classes(asked)})
     drivers = map(tables.driven, section(root, "resources"))
     bodies = map(tables.embodied, () if tables.world is None else tables.world.all("robot"))
-    return {**tables.classes, **ask_classes([one for one in (*drivers, *bodies) if one])}
+    planners = map(tables.planned, section(root, "core"))
+    return {**tables.classes, **ask_classes([one for one in (*drivers, *bodies, *planners) if one])}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from backbone.authentication import is_loopback
-from backbone.mission.class_facts import ClassFacts
+from backbone.mission.class_facts import PLANNER, ClassFacts
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
@@ -105,6 +105,12 @@ class Tables:
         if self.world is None or self.world.text("type") not in self.types or not self.is_only_here or not is_own:
             return ""
         return "" if class_path_fault(body) else f"{self.types[self.world.text('type')].text('class')} {body}"
+
+    def planned(self, service: Element) -> str:
+        """Return the question about a planner of one's own for ``ask_classes``; empty: none, or not on this machine."""
+        planner = str(parameters(service).get(PLANNER, ""))
+        is_asked = self.is_only_here and CLASS_PATH.fullmatch(planner) and not class_path_fault(planner)
+        return f"{PLANNER} {planner}" if is_asked else ""
 
     @property
     def is_only_here(self) -> bool:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 from typing import Protocol, cast
 
 from backbone.errors import Refusal, complaint
 from backbone.scheduling.planner import Planner
 from backbone.scheduling.table import Table
+
+MEND = "Correct the fault that the message names in the planner's file."
 
 
 class PlannerType(Protocol):
@@ -44,11 +47,15 @@ def load_planner(class_path: str) -> PlannerType | None:
     except (ImportError, AttributeError, ValueError) as error:
         raise WrongPlanner(f"{class_path}: {error}", class_path=class_path) from error
     except (Exception, SystemExit) as error:  # a file that is being written raises anything
-        remedy = "Correct the fault that the message names in the planner's file."
-        raise WrongPlanner(f"{class_path}: {complaint(error)}", remedy=remedy, class_path=class_path) from error
+        raise WrongPlanner(f"{class_path}: {complaint(error)}", remedy=MEND, class_path=class_path) from error
     lacking = sorted(one for one in vars(Planner) if not one.startswith("_") and not _has(found, one))
     if lacking or not isinstance(found, type):
         raise WrongPlanner(f"{class_path} is no planner: it lacks {', '.join(lacking)}", class_path=class_path)
+    try:
+        inspect.signature(found).bind(None, slack_s=0.0)
+    except TypeError as error:
+        told = f"{class_path}: its constructor: {error}; it is called as {name}(table, slack_s=…)"
+        raise WrongPlanner(told, remedy=MEND, class_path=class_path) from error
     return cast(PlannerType, found)
 
 

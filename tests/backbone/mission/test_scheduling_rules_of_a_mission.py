@@ -6,13 +6,10 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from typer.testing import CliRunner
 
-from backbone.command_line.cli import app
 from backbone.component.launch import Launch
 from backbone.dry_run.run import dry_run
 from backbone.launcher.core_launches import UpOptions, core_launches
-from backbone.launcher.endings import ExitCode
 from backbone.mission.class_facts import parameters_of
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import MissionInvalid, read_mission
@@ -93,19 +90,13 @@ def test_the_reference_tells_every_rule_with_its_default_and_meaning() -> None:
     [
         ("nonsense", "planner='nonsense' is illegal"),
         ("no.module:Planner", "no.module:Planner: no module no"),
+        ("backbone.scheduling.rules:SchedulingRules", "is no planner: it lacks before, due"),
         ("backbone.scheduling.whole_group:WholePlanner", "(did you mean 'WholeGroupPlanner'?)"),
     ],
 )
-def test_a_planner_that_is_not_there_is_a_fault_with_its_place(tmp_path: Path, planner: str, message: str) -> None:
+def test_what_is_no_planner_here_is_a_fault_with_its_place(tmp_path: Path, planner: str, message: str) -> None:
     with pytest.raises(MissionInvalid) as invalid:
         with_rules(tmp_path, planner=planner)
     (fault,) = invalid.value.faults
     assert message in str(fault)
     assert fault.line == 12
-
-
-def test_a_dry_run_with_a_class_that_is_no_planner_says_so(tmp_path: Path) -> None:
-    with_rules(tmp_path, planner="backbone.scheduling.rules:SchedulingRules")
-    done = CliRunner().invoke(app, ["check", "--dry-run", str(tmp_path / "m.xml")])
-    assert done.exit_code == ExitCode.MISSION_INVALID
-    assert "is no planner: it lacks before, due" in done.output

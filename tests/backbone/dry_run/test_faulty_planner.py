@@ -1,0 +1,51 @@
+"""A planner of one's own with a fault is refused by check, or at the latest by the dry run, and never ends it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from backbone.command_line.rehearsing import print_dry_run
+from backbone.launcher.endings import ExitCode
+from backbone.mission.reader import MissionInvalid, read_mission
+
+MISSION = (Path(__file__).parents[3] / "mission.xml").read_text()
+HEAD = "from backbone.scheduling.whole_group import WholeGroupPlanner\nclass Own(WholeGroupPlanner):\n    "
+
+
+def file_of(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, method: str) -> Path:
+    monkeypatch.syspath_prepend(folder)
+    (folder / f"{name}.py").write_text(f"{HEAD}{method}\n")
+    planner = f'<parameter name="planner" value="{name}:Own"/>'
+    file = folder / "mission.xml"
+    file.write_text(MISSION.replace("<hosts>", f'<core><service type="rc_manager">{planner}</service></core><hosts>'))
+    return file
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "told"),
+    [
+        ("planner_made_otherwise", "def __init__(self): pass", "its constructor: too many positional arguments"),
+        ("planner_of_no_arcs", "def order(self): return []", "order: too many positional arguments"),
+        ("planner_awaited", "async def order(self, arcs): return []", "order is an 'async def'"),
+    ],
+)
+def test_a_planner_that_cannot_be_made_or_called_is_refused_by_check(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, method: str, told: str
+) -> None:
+    with pytest.raises(MissionInvalid) as caught:
+        read_mission(file_of(tmp_path, monkeypatch, name, method))
+    [fault] = caught.value.faults
+    assert f"{name}:Own: {told}" in fault.message
+
+
+def test_a_planner_that_fails_at_work_is_refused_by_the_dry_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    method = "def order(self, arcs): return [one.nope for one in arcs]"
+    mission = read_mission(file_of(tmp_path, monkeypatch, "planner_with_a_bug", method))
+    assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
+    told = capsys.readouterr().err
+    assert "planner_with_a_bug:Own: AttributeError" in told
+    assert "planner_with_a_bug.py, line 3" in told
