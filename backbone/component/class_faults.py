@@ -1,7 +1,7 @@
 """Faults of a component's class that show without an instance of it.
 
-A method that is async where the base class is not would do nothing, as nobody awaits it. Parameters that only the type
-checker knows would never be read.
+A method that is async where the base class is not would do nothing, as nobody awaits it. An object whose base class was
+not made lacks its attributes. Parameters that only the type checker knows would never be read.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ def class_faults(kind: type) -> Iterator[str]:
         own, base = definitions[0], definitions[-1]
         if own is not base and not name.startswith("__") and inspect.isfunction(own) and inspect.isfunction(base):
             yield from _of_override(name, own, base)
+    yield from _of_constructors(kind)
     yield from _of_parameters(kind)
 
 
@@ -51,6 +52,19 @@ def _can_be_awaited(function: typing.Any) -> bool:
     plain = inspect.unwrap(function)
     result = str(inspect.signature(plain).return_annotation)
     return inspect.iscoroutinefunction(plain) or any(word in result for word in ("Awaitable", "Coroutine", "Future"))
+
+
+def _of_constructors(kind: type) -> Iterator[str]:
+    """Yield a fault for each constructor that cannot call that of its base class."""
+    made = [one for one in kind.__mro__ if inspect.isfunction(vars(one).get("__init__")) and not _is_protocol(one)]
+    for one in made[:-1]:
+        constructor = inspect.unwrap(vars(one)["__init__"])
+        if not {"super", "__init__"} & set(constructor.__code__.co_names):
+            yield f"__init__ of {one.__name__} does not call super().__init__; call it first, with the same arguments"
+
+
+def _is_protocol(kind: type) -> bool:
+    return bool(vars(kind).get("_is_protocol"))
 
 
 def _of_parameters(kind: type) -> Iterator[str]:

@@ -7,8 +7,10 @@ from typing import Any
 
 import pytest
 
+from backbone.bus.interface import Bus, Clock
 from backbone.component.class_faults import class_faults
 from backbone.component.class_path import SHIPPED, WrongClassPath, load_class
+from backbone.component.launch import Launch
 from backbone.mission.class_facts import shipped_classes
 from backbone.mission.class_probe import facts_of
 from mission_control.behavior import Behavior, BehaviorParameters
@@ -43,6 +45,24 @@ class Short(Quiet):
         pass
 
 
+class Forgetful(Quiet):
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        self.count = 0
+
+
+class Careful(Quiet):
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        Quiet.__init__(self, launch, bus, clock)
+
+
+class Heir(Forgetful):
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+
+
+FORGOTTEN = "__init__ of Forgetful does not call super().__init__; call it first, with the same arguments"
+
+
 class Speed(BehaviorParameters, frozen=True):
     speed_m_s: float = 0.1
 
@@ -61,6 +81,8 @@ class Read(Behavior[Speed]):
         (Unseeing, "see is an 'async def'; write it as a 'def', as the base class does"),
         (Unawaited, "act is a 'def'; write it as an 'async def', as the base class does"),
         (Short, "suspended: too many positional arguments; the base class has suspended(self, reason, by)"),
+        (Forgetful, FORGOTTEN),
+        (Heir, FORGOTTEN),
         (Unread, "it has Speed in brackets and reads BehaviorParameters; write 'parameters_type = Speed' in it"),
     ],
 )
@@ -72,7 +94,7 @@ def test_a_class_that_cannot_work_is_refused_by_check_at_its_start_and_by_swap(k
         load_class(class_path)
 
 
-@pytest.mark.parametrize("kind", [Quiet, Passing, Read])
+@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful])
 def test_a_class_that_can_work_has_no_fault(kind: type) -> None:
     assert list(class_faults(kind)) == []
 
