@@ -19,6 +19,7 @@ from mission_control.modules.choice import CLASS_PATH as CHOICE
 from mission_control.modules.choice import ChoiceOrder, choice_faults
 from mission_control.modules.graph import OUTSIDE, Graph, GraphRefused, Member, WiringFault
 from mission_control.modules.orders import (
+    MEND,
     ModuleOrder,
     Running,
     Source,
@@ -221,7 +222,8 @@ def _of_given(key: str, declared: GivenKey) -> Iterator[UnitFault]:
             remedy = "Name a class that derives from backbone.wire:Message"
             yield UnitFault(f"{declared.type}, the class of {key}, is no message", remedy, given=key)
     except Refusal as refusal:
-        yield UnitFault(refusal.detail, "Write the class as package.module:Class", given=key)
+        remedy = MEND if refusal.remedy == MEND else "Write the class as package.module:Class"
+        yield UnitFault(refusal.detail, remedy, given=key)
 
 
 def _of_graph(fault: WiringFault, units: Sequence[UnitOrder]) -> UnitFault:

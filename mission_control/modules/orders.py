@@ -26,6 +26,9 @@ class WrongModule(WrongClass):
     remedy = "Write the class as package.module:Class, derived from mission_control.modules.module:Module."
 
 
+MEND = "Mend the file of the class, so that it can be imported."
+
+
 class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A module of a unit.
 
@@ -138,7 +141,9 @@ def load_at(class_path: str) -> object:
         return operator.attrgetter(name)(importlib.import_module(file))
     except Exception as error:  # a file that is just being written may raise any exception
         told = printable(f"{class_path}: {type(error).__name__}: {error}")
-        raise WrongModule(told, class_path=class_path) from error
+        is_path = isinstance(error, ModuleNotFoundError) and f"{file}.".startswith(f"{error.name}.")
+        remedy = WrongModule.remedy if is_path or isinstance(error, AttributeError) else MEND
+        raise WrongModule(told, remedy=remedy, class_path=class_path) from error
 
 
 def load_module_class(class_path: str) -> type[Module]:
