@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 
-from backbone.addresses import PLACER
-from backbone.command_line.attributes import attributes_of, change
+from backbone.addresses import NAMESERVER, PLACER
+from backbone.bus.interface import Bus
+from backbone.command_line.attributes import REPLY_TIME_S, attributes_of, change
 from backbone.command_line.connection import connected
 from backbone.command_line.where import Where
+from backbone.component_database.messages import UnknownType
+from backbone.errors import LinkError, Refusal
 from backbone.launcher.endings import ExitCode, say, show
-from backbone.launcher.start_by_hand import completed
+from backbone.launcher.start_by_hand import completed, named_in_place_of_its_type
 from backbone.mission_log.operators import OperatorAction, login_name, publish_action
+from backbone.nameserver.messages import Resolve, Resolved
 from backbone.naming import component_of
-from backbone.placer.messages import Ended, Start, Started, StopComponent
+from backbone.placer.messages import Ended, NotPlaced, Start, Started, StopComponent
 from backbone.placer.wishes import START_WITHIN_S
 from backbone.spoken import value_text
 
@@ -23,7 +27,10 @@ async def start_component(where: Where, wanted: Start) -> ExitCode:
     """Start the component, print where it runs and why there, and publish the action."""
     async with connected(where) as (bus, clock):
         order, remark = await completed(bus, wanted)
-        started = await bus.ask(PLACER, order, Started, within_s=START_WITHIN_S)
+        try:
+            started = await bus.ask(PLACER, order, Started, within_s=START_WITHIN_S)
+        except UnknownType as refusal:
+            raise await named_in_place_of_its_type(bus, refusal, order) from None
         if remark:
             say(remark)
         publish_action(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {wanted.type}")
@@ -36,10 +43,23 @@ async def start_component(where: Where, wanted: Start) -> ExitCode:
 async def stop_component(where: Where, name: str) -> ExitCode:
     """End the component, print how it ended, and publish the action."""
     async with connected(where) as (bus, clock):
-        ended = await bus.ask(PLACER, StopComponent(name, "by command"), Ended, within_s=STOP_WITHIN_S)
+        try:
+            ended = await bus.ask(PLACER, StopComponent(name, "by command"), Ended, within_s=STOP_WITHIN_S)
+        except NotPlaced as refusal:
+            raise await running_otherwise(bus, refusal, name) from None
         publish_action(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
         show([f"{name} ended by {ended.by}"])
     return ExitCode.DONE
+
+
+async def running_otherwise(bus: Bus, refusal: NotPlaced, name: str) -> NotPlaced:
+    """Return the refusal to stop a component, with another remedy if it runs and no placer started it."""
+    try:
+        await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)
+    except (Refusal, LinkError):
+        return refusal
+    remedy = "A core service ends with the mission, 'scout-backbone down'; a console ends where it was opened."
+    return NotPlaced(f"{name} runs, but the placer did not start it", remedy=remedy, name=name)
 
 
 async def set_attribute(where: Where, name: str, attribute: str, value: object) -> ExitCode:

@@ -11,6 +11,7 @@ import msgspec
 
 from backbone.addresses import DEPENDENCY_DATABASE, LAUNCHER
 from backbone.bus.interface import Bus
+from backbone.component_database.messages import UnknownType
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import Refusal
 from backbone.launcher.messages import AskDeclared, DeclaredOrder
@@ -38,6 +39,20 @@ async def completed(bus: Bus, order: Start) -> tuple[Start, str]:
         return complete(order, found.resources)
     declared = (await bus.ask(LAUNCHER, AskDeclared(order.name), DeclaredOrder, within_s=REPLY_TIME_S)).order
     return (order if declared is None else as_declared(order, declared)), ""
+
+
+async def named_in_place_of_its_type(bus: Bus, refusal: UnknownType, order: Start) -> UnknownType:
+    """Return the refusal of an order's type, with the order that the operator meant if the mission has such a name."""
+    found = await bus.ask(DEPENDENCY_DATABASE, AskResources(), Resources, within_s=REPLY_TIME_S)
+    declared = (await bus.ask(LAUNCHER, AskDeclared(order.type), DeclaredOrder, within_s=REPLY_TIME_S)).order
+    kinds = [
+        *(each.type for each in found.resources if each.name == order.type),
+        *([declared.type] if declared else []),
+    ]
+    if not kinds:
+        return refusal
+    remedy = f"Write: scout-backbone start {kinds[0]} --name {order.type}"
+    return UnknownType(f"{order.type} is the name of a component, whose type is {kinds[0]}", remedy=remedy)
 
 
 def complete(order: Start, resources: list[Resource]) -> tuple[Start, str]:

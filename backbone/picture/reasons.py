@@ -159,6 +159,8 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         remarks.append(
             f"no component has an event that {asked.message} led to; each keeps its newest {STORY_LENGTH} events"
         )
+    if isinstance(placement, NotPlaced) and placement.facts.get("stopped"):
+        remarks.append(placement.detail)
     reasons = Reasons(
         name,
         why if isinstance(why, Why) else None,

@@ -76,8 +76,8 @@ class PlacementBook:
         found = self._records.get(name)
         if found is None:
             stopped = self._stopped.get(name, "")
-            because = f": it was stopped, {stopped}" if stopped else did_you_mean(name, self._records)
-            raise NotPlaced(f"{name!r} was not placed{because}", name=name, stopped=name in self._stopped)
+            told = f"was stopped, {stopped}" if stopped else f"was not placed{did_you_mean(name, self._records)}"
+            raise NotPlaced(f"{name!r} {told}", name=name, stopped=name in self._stopped)
         return found
 
     def find(self, name: str) -> PlacementRecord | None:
