@@ -22,6 +22,14 @@ def complete_robot(ctx: typer.Context) -> list[str]:
     return names.robots if names is not None else []
 
 
+def _named_or_left_out(ctx: typer.Context, parameter: typer.CallbackParam, value: str) -> str:
+    """Refuse an empty name, such as that of an unset variable of a shell, which means no robot in particular."""
+    source = ctx.get_parameter_source(parameter.name or "")
+    if not value and source is not None and source.name == "COMMANDLINE":
+        raise typer.BadParameter("the name is empty: name a robot, or leave it out to take any free one")
+    return value
+
+
 _seconds = partial(typer.Option, min=0.0, max=LONGEST_WAIT_S)
 _priority = partial(typer.Option, min=LEAST_PRIORITY, max=MOST_PRIORITY)
 RECORDING = "this recording instead: play it, go to any time, ask why; nothing needs to be up."
@@ -40,7 +48,12 @@ User = Annotated[
 
 # ---------------------------------------------------------------------- of attach
 Robot = Annotated[
-    str, typer.Argument(autocompletion=complete_robot, help="Robot to take over; none: any free one with a camera.")
+    str,
+    typer.Argument(
+        callback=_named_or_left_out,
+        autocompletion=complete_robot,
+        help="Robot to take over; none: any free one with a camera.",
+    ),
 ]
 Priority = Annotated[int, _priority(help="Beside the mission's own; larger is higher.")]
 ProfileName = Annotated[Profile, typer.Option(help="How the console looks.")]

@@ -35,6 +35,12 @@ def test_a_wrong_script_is_refused_with_its_line_before_a_mission_is_looked_for(
     assert "line 2" in done.stderr
 
 
+def test_an_empty_name_takes_no_robot_at_random() -> None:
+    done = CliRunner().invoke(app, ["attach", "", "--json"])
+    assert done.exit_code == 2
+    assert "the name is empty" in done.stderr
+
+
 def test_a_missing_script_is_named(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["attach", "--script", str(tmp_path / "none.jsonl")])
     assert done.exit_code == 2
