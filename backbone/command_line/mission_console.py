@@ -101,7 +101,8 @@ class ConsoleObserver:
 
     async def up(self, bus: Bus, clock: Clock) -> None:
         """Show the mission until cancelled."""
-        self.tell("all ready; end with Ctrl-C or 'scout-backbone down'")
+        ends = "'scout-backbone down'" if self._verdict is not None else "Ctrl-C or 'scout-backbone down'"
+        self.tell(f"all ready; end with {ends}")
         self.decide(ExitCode.DONE)
         self._is_up = True
         if self._live:

@@ -75,8 +75,6 @@ async def print_attributes(where: Where, name: str, attribute: str | None, *, as
     """Print one attribute of the name, or all."""
     async with connected(where) as (bus, _):
         shown = await attributes_of(bus, name)
-        if as_json:
-            show([json.dumps(shown.to_json())])
-        else:
-            show(shown.lines() if attribute is None else shown.of(attribute))
+        lines = shown.lines() if attribute is None else shown.of(attribute)
+        show([json.dumps(shown.to_json())] if as_json else lines)
     return ExitCode.DONE

@@ -127,7 +127,8 @@ async def record_to(
             await _run(recorder, path, for_s, ends_with_input=told.host_only)
             if beats is not None:
                 beats.end()
-    say(f"{path}: {counted(recorder.written, 'message')}")
+    left = path if files.oldest == path else f"{files.oldest} and later, older ones are deleted"
+    say(f"{left}: {counted(recorder.written, 'message')}")
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
     if recorder.deleted:

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from backbone.dry_run.run import FIRST_MINUTE_S, dry_run
 from backbone.dry_run.screen import screen
-from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.endings import ExitCode, complaint_of, say
 from backbone.mission.model import MissionDescription
 from backbone.run_files import TraceUnwritable, begin_trace
 from backbone.scheduling.own_planner import WrongPlanner
@@ -30,7 +30,7 @@ def print_dry_run(
             begin_trace(trace)
         dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
     except (WrongPlanner, TraceUnwritable) as refused:
-        say(f"{refused.detail} (remedy: {refused.remedy})")
+        say(complaint_of(refused)[0])
         return ExitCode.REFUSED if isinstance(refused, TraceUnwritable) else ExitCode.MISSION_INVALID
     Console(width=width, markup=False, emoji=False).print(screen(dry))
     if trace is not None:

@@ -32,6 +32,11 @@ class RecordingFiles:
         self.file: IO[bytes] = self._open()
 
     @property
+    def oldest(self) -> Path:
+        """Path of the oldest file that is kept."""
+        return self._kept[0]
+
+    @property
     def is_deleted(self) -> bool:
         """Whether the open file was deleted; then all that is written to it is lost."""
         return not self.file.closed and os.fstat(self.file.fileno()).st_nlink == 0

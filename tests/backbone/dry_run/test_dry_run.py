@@ -257,7 +257,7 @@ def test_a_trace_replaces_no_file(check: Callable[..., Any], tmp_path: Path) -> 
     file.write_text("notes")
     refused = check("--dry-run", "--trace", file)
     assert (refused.exit_code, file.read_text()) == (5, "notes")
-    assert "has content (remedy: Name a new file" in refused.stderr
+    assert "has content (Name a new file" in refused.stderr
 
 
 @pytest.mark.parametrize("words", [("--for", "5"), ("--trace", "x.jsonl"), ("--dry-run", "--for", "0")], ids=" ".join)
