@@ -13,11 +13,13 @@ from typing import Annotated, Any, Literal, Union
 import msgspec
 
 from backbone.component.abilities import NO_ABILITIES, Abilities
+from backbone.spoken import counted
 
 SHIPPED = "shipped_classes.json"
 PLANNER = "planner"  # the RC manager's parameter that names a planner of one's own
 
 _LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
+_LENGTHS = {"minLength": "at least", "maxLength": "at most"}
 _META = {"minimum": "ge", "exclusiveMinimum": "gt", "maximum": "le", "exclusiveMaximum": "lt"}
 _META |= {"pattern": "pattern", "minLength": "min_length", "maxLength": "max_length"}
 _PEOPLE = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
@@ -78,7 +80,10 @@ class ParameterFacts(msgspec.Struct, frozen=True):
 
     @property
     def _span(self) -> list[str]:
-        return [f"{word} {self.schema[limit]:g}" for limit, word in _LIMITS.items() if limit in self.schema]
+        spans = [f"{word} {self.schema[limit]:g}" for limit, word in _LIMITS.items() if limit in self.schema]
+        lengths = [(word, self.schema[limit]) for limit, word in _LENGTHS.items() if limit in self.schema]
+        spans += [f"{word} {counted(length, 'character')}" for word, length in lengths]
+        return [*spans, f"of the pattern {self.schema['pattern']}"] if "pattern" in self.schema else spans
 
     def accepts(self, value: object) -> bool:
         """Return whether the class can start with this value."""

@@ -75,7 +75,9 @@ def check_named(behavior: Element, tables: Tables, report: Report) -> None:
             report.fault(
                 given[one.name].place_of("value"),
                 f"no {'component' if what == 'source' else what} is named {quoted(value)}{report.hint(name, known)}",
-                f"There is: {listed(known)}" if known else f"Add it to the mission, or write another {one.name}",
+                f"There is: {names}"
+                if (names := listed(known))
+                else f"Add it to the mission, or write another {one.name}",
             )
 
 

@@ -102,7 +102,7 @@ def listed(names: Collection[str]) -> str:
         >>> listed(["radio", "grabber"])
         'radio, grabber'
     """
-    each = list(dict.fromkeys(names))
+    each = [name for name in dict.fromkeys(names) if name]  # a missing name is a fault of its own
     first = each[:NAMES_LISTED]
     rest = len(each) - len(first)
     return ", ".join(first) + (f" and {rest} more" if rest else "")

@@ -207,7 +207,7 @@ def is_known(element: Element, attribute: str, what: str, known: Collection[str]
     if name in known:
         return True
     if is_legal(name):
-        there = f"There is: {listed(known)}" if known else f"Declare a {what} of this name"
+        there = f"There is: {names}" if (names := listed(known)) else f"Declare a {what} of this name"
         report.fault(element.place_of(attribute), f"no {what} is named {quoted(name)}{report.hint(name, known)}", there)
     return False
 

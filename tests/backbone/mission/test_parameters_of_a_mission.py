@@ -7,6 +7,7 @@ import sys
 import time
 from enum import Enum
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 import pytest
@@ -316,3 +317,17 @@ def test_the_only_robot_of_a_mission_needs_its_network_id_too(tmp_path: Path) ->
     )
     faults = faults_in(tmp_path, re.sub(r" *<robot .*\n", "", without))
     assert [fault.message for fault in faults] == ["scout scout1 lacks parameter network_id"]
+
+
+def test_a_text_that_its_pattern_or_length_refuses_gets_them_in_the_remedy() -> None:
+    class Kinds(msgspec.Struct):
+        code: Annotated[str, msgspec.Meta(pattern="^[A-Z]+$", min_length=1, max_length=4)] = "A"
+
+    [code] = parameters_of(Kinds)
+    assert code.legal_values == "a text, at least 1 character, at most 4 characters, of the pattern ^[A-Z]+$"
+
+
+def test_a_remedy_lists_no_nameless_elements(tmp_path: Path) -> None:
+    text = SMALL.replace('<resource type="command_radio" name="radio"', '<resource type="command_radio"')
+    remedies = [fault.remedy for fault in faults_in(tmp_path, text) if "no command_radio is named" in fault.message]
+    assert set(remedies) == {"Declare a command_radio of this name"}
