@@ -20,6 +20,8 @@ import math
 from dataclasses import dataclass
 from random import Random
 
+from backbone.ranges import A_DAY_S
+
 GLIMPSE_FRAMES = (2, 4)  # chosen: two frames probably, four certainly include a good one; longer slices come less often
 EXTENSION = 1.5  # chosen: multiples of the detection time, because a burst of bad frames delays many detections
 GRAIN_S = 0.001  # chosen: finer times are meaningless
@@ -76,7 +78,7 @@ def useful_run_times(
     short_pays = view_s > settling_s + blind_s + detect_s
     least, most = (blind_s + frames * frame_s if short_pays else given_s for frames in GLIMPSE_FRAMES)
     longest_s = min(given_s, most)
-    maximum_s = longest_s + EXTENSION * detect_s
+    maximum_s = max(longest_s, min(A_DAY_S, longest_s + EXTENSION * detect_s))  # no ARC accepts a longer one
     return RunTimes(*map(_whole_grains, (min(given_s, least), longest_s, maximum_s)))
 
 

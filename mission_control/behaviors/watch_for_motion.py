@@ -18,6 +18,7 @@ from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
+from backbone.ranges import A_DAY_S
 from backbone.spoken import counted
 from backbone.wire import Message
 from mission_control.behavior import Behavior, BehaviorParameters
@@ -32,6 +33,9 @@ from resource_pool.arc_client import Frame
 PICTURE, SWAPPED_IN, JUDGED = "picture", "swapped_in", "judged"  # keys that the modules' classes declare
 BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is clearly visible
 REPORT_EVERY_FRAMES = 30  # chosen: about once a second
+MOST_FRAMES = 1_000  # chosen: a minute of video
+LEAST_HZ, MOST_HZ = 0.5, 1_000.0  # chosen: slower is no video, faster no camera
+LEAST_CLEAN = 0.05  # chosen: of worse pictures no motion is certain
 
 
 class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -44,17 +48,17 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
             times, which are at most the tree's. 0: it requests the tree's run times.
         settling_s: Time from a context switch to the first picture, mission seconds; used with view_s.
         frame_rate_hz: Pictures a second; used with view_s.
-        clean_share: Share of usable pictures, above 0 to 1; used with view_s.
+        clean_share: Share of usable pictures, 0.05 to 1; used with view_s.
         seed: Seed of the random run times.
         vision: Name of the execution unit that analyzes the pictures; empty: the behavior analyzes them itself.
     """
 
-    again_after_s: float = 1.0
-    frames_wanted: Annotated[int, msgspec.Meta(ge=1)] = 1
-    view_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
-    settling_s: Annotated[float, msgspec.Meta(ge=0)] = 0.3
-    frame_rate_hz: Annotated[float, msgspec.Meta(gt=0)] = 15.0
-    clean_share: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.75
+    again_after_s: Annotated[float, msgspec.Meta(le=A_DAY_S)] = 1.0
+    frames_wanted: Annotated[int, msgspec.Meta(ge=1, le=MOST_FRAMES)] = 1
+    view_s: Annotated[float, msgspec.Meta(ge=0, le=A_DAY_S)] = 0.0
+    settling_s: Annotated[float, msgspec.Meta(ge=0, le=A_DAY_S)] = 0.3
+    frame_rate_hz: Annotated[float, msgspec.Meta(ge=LEAST_HZ, le=MOST_HZ)] = 15.0
+    clean_share: Annotated[float, msgspec.Meta(ge=LEAST_CLEAN, le=1)] = 0.75
     seed: int = 0
     vision: Annotated[str, msgspec.Meta(extra_json_schema={"names": "unit"})] = ""
 

@@ -5,11 +5,20 @@ from __future__ import annotations
 import math
 from random import Random
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.ranges import A_DAY_S
 from mission_control.behaviors.run_times import RunTimes, useful_run_times
+from mission_control.behaviors.watch_for_motion import (
+    LEAST_CLEAN,
+    LEAST_HZ,
+    MOST_FRAMES,
+    WatchParameters,
+    run_times,
+)
 
 times = st.floats(0.01, 20.0)
 
@@ -54,3 +63,24 @@ def test_nothing_is_drawn_where_there_is_no_choice() -> None:
 def test_times_that_are_none_are_refused(wrong: float) -> None:
     with pytest.raises(ValueError, match="no run times"):
         useful_run_times(view_s=wrong, settling_s=0.3, blind_s=0.5, frame_s=0.1, detect_s=0.8, given_s=5.0)
+
+
+@pytest.mark.parametrize(
+    "wild",
+    [
+        {"view_s": 1e17},
+        {"settling_s": 1e17},
+        {"frame_rate_hz": 1e-10},
+        {"clean_share": 1e-10},
+        {"frames_wanted": 10**9},
+    ],
+    ids=str,
+)
+def test_numbers_that_no_camera_and_no_target_has_are_refused(wild: dict[str, float]) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert({"view_s": 5.0, **wild}, WatchParameters)
+
+
+def test_the_longest_run_time_is_one_that_an_arc_accepts() -> None:
+    slowest = WatchParameters(view_s=1.0, frame_rate_hz=LEAST_HZ, clean_share=LEAST_CLEAN, frames_wanted=MOST_FRAMES)
+    assert run_times(slowest, A_DAY_S).maximum_s == A_DAY_S
