@@ -100,7 +100,7 @@ class Draft:
 
     @property
     def problems(self) -> tuple[Fault, ...]:
-        """The faults that ``scout-backbone check`` would report, except for classes not looked up; empty: no fault."""
+        """The faults that ``scout-backbone check`` reports without running code of one's own; empty: no fault."""
         return self._read if isinstance(self._read, tuple) else ()
 
     @property
