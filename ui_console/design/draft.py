@@ -15,7 +15,7 @@ from pathlib import Path as FilePath
 
 from backbone.atomic_file import remove_leftover
 from backbone.dry_run.run import DryRun, dry_run
-from backbone.mission.class_facts import ClassFacts
+from backbone.mission.class_facts import PLANNER, ClassFacts
 from backbone.mission.document import read_bytes
 from backbone.mission.edit import Element, Path, outline, set_attribute
 from backbone.mission.model import MissionDescription
@@ -110,8 +110,10 @@ class Draft:
 
     @cached_property
     def rehearsal(self) -> DryRun | None:
-        """The first minute of its schedule; None while it has problems."""
-        return None if self.description is None else dry_run(self.description)
+        """The first minute of its schedule; None while it has problems or names a planner, which would run here."""
+        if self.description is None or self.description.core_parameters("rc_manager").get(PLANNER):
+            return None
+        return dry_run(self.description)
 
     # ------------------------------------------------------------------ steps
     def do(self, command: DesignCommand) -> Draft:

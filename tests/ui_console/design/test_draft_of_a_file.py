@@ -91,3 +91,16 @@ def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: by
     for node in draft.mission:
         element_view(draft, node.path, {})
     assert draft.problems or draft.rehearsal is not None
+
+
+def test_no_planner_that_a_page_names_runs_on_the_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "planner_of_a_page.py").write_text(
+        "from pathlib import Path\nPath(__file__).with_name('ran').touch()\nclass Own: ...\n"
+    )
+    planner = '<parameter name="planner" value="planner_of_a_page:Own"/>'
+    core = f'<core><service type="rc_manager">{planner}</service></core><hosts>'
+    draft = Draft("m.xml", TextState(SHIPPED[0].read_bytes().replace(b"<hosts>", core.encode())))
+    assert draft.problems == ()
+    assert draft.rehearsal is None
+    assert not (tmp_path / "ran").exists()
