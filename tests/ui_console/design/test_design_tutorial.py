@@ -34,7 +34,7 @@ async def test_classes_are_asked_in_another_process_and_one_that_cannot_be_says_
     scout, missing = "resource_pool.rcs.scout:Scout", "no.such.module:Thing"
     found = await look_up([watch, scout, missing])
     told = {one.name: one for one in found[watch].parameters}
-    assert told["clean_share"].summary == "number, above 0, at most 1, default 0.75"
+    assert told["clean_share"].summary == "number, at least 0.05, at most 1, default 0.75"
     assert told["again_after_s"].doc == "Time after which continuing motion is published again, mission seconds."
     assert not {"path", "arc", "children"} & set(told)
     assert "network_id" in {one.name for one in found[scout].parameters}
