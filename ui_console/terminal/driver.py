@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-import select
+import selectors
 from codecs import getincrementaldecoder
 from collections.abc import Iterable
 
@@ -68,15 +68,17 @@ class TerminalDriver(LinuxDriver):
     def _read(self) -> None:
         decode = getincrementaldecoder("utf-8")("replace").decode
         parser = KnownKeys()
-        while not self.exit_event.is_set():
-            typed = b""
-            if select.select([self.fileno], [], [], TICK_S)[0] and not (typed := os.read(self.fileno, READ_MOST_BYTES)):
-                return  # the terminal was closed
-            for character in decode(typed):
-                try:
-                    for event in parser.feed(character):
-                        self.process_message(event)
-                except (ValueError, OverflowError):  # an escape sequence with an impossible number
-                    parser = KnownKeys()
-            for event in parser.tick():
-                self.process_message(event)
+        with selectors.SelectSelector() as keyboard:
+            keyboard.register(self.fileno, selectors.EVENT_READ)
+            while not self.exit_event.is_set():
+                typed = b""
+                if keyboard.select(TICK_S) and not (typed := os.read(self.fileno, READ_MOST_BYTES)):
+                    return  # the terminal was closed
+                for character in decode(typed):
+                    try:
+                        for event in parser.feed(character):
+                            self.process_message(event)
+                    except (ValueError, OverflowError):  # an escape sequence with an impossible number
+                        parser = KnownKeys()
+                for event in parser.tick():
+                    self.process_message(event)
