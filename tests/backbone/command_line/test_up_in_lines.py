@@ -22,15 +22,15 @@ def test_consoles_that_came_and_went_are_not_kept_but_named_by_their_people() ->
         observer = ConsoleObserver(Console(file=lines), live=False)
         observer.connected(network.join("backbone/launcher", clock))
         for number in range(100):
-            address = f"ui_console/console-{number}"
+            address = f"ui_console/passing-{number}"
             bus = network.join(address, clock)
             state = ComponentState(address, "console", "base", number, LifeState.READY, 0.0, user=f"Anna {number}")
             bus.publish(address, Conversation.STATUS, state)
-            story = StoryEvent(0.0, address, f"was taken by console-{number}-drive", "scout1", "")
+            story = StoryEvent(0.0, address, f"was taken by passing-{number}-drive", "scout1", "")
             bus.publish(address, Conversation.LOG, story)
             await clock.sleep_s(1.0)
             await bus.close()
-        kept = [one for one in gc.get_objects() if isinstance(one, dict) and "ui_console/console-7" in one]
+        kept = [one for one in gc.get_objects() if isinstance(one, dict) and "ui_console/passing-7" in one]
         assert kept == []
 
     run_virtual(scene())
