@@ -369,10 +369,11 @@ class ZenohBus(LifeBus):
         self.empty_inbox()  # pending questions: their requesters get ``NoResponder``
         self.ways.close()
         self.lossless.close()
-        names = self._outlets.close()
         if not self._shared:
+            self._outlets.close_boards()
             for sockets in (self.far, self.copies, self.ways.lines):
                 if sockets is not None:
                     sockets.close()
             await close_session(self._session)
-        del names  # not earlier: messages under way need them
+            return
+        self._outlets.close()

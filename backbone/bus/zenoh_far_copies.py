@@ -73,10 +73,6 @@ class FarCopies:
     def close(self) -> None:
         """Publish the waiting copies, and send no more. Idempotent."""
         self._publish()
-        if self._is_open:
-            self._name = self._publisher.key_expr  # copies under way need it; see ``Outlet.close``
-            self._matching.undeclare()
-            self._publisher.undeclare()  # type: ignore[no-untyped-call]
         self._is_open = False
 
     def _publish(self) -> None:

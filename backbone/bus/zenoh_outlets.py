@@ -125,20 +125,14 @@ class Outlet:
             self._token.undeclare()  # type: ignore[no-untyped-call]
         self._token = self._declare_token()
 
-    def close(self) -> zenoh.KeyExpr:
-        """Withdraw the publisher, and return its key.
-
-        The hub knows the key as long as the caller keeps it; messages under way need it. If a session closes with a
-        publisher, the hub keeps the key for ever: 1.4 kB (measured with zenoh 1.10).
-        """
-        name = self.publisher.key_expr
+    def close(self) -> None:
+        """Withdraw the publisher."""
         for entity in (self._token, self._matching):
             if entity is not None:
                 entity.undeclare()
         if self.board is not None:
             self.board.close()
         self.publisher.undeclare()  # type: ignore[no-untyped-call]
-        return name
 
 
 class Outlets:
@@ -181,11 +175,17 @@ class Outlets:
         """Whether a further outlet replaces another one."""
         return len(self._outlets) >= MOST_PUBLISHERS
 
-    def close(self) -> list[zenoh.KeyExpr]:
-        """Withdraw all, and return their keys; see ``Outlet.close``."""
-        names = [outlet.close() for outlet in self._outlets.values()]
+    def close(self) -> None:
+        """Withdraw all."""
+        for outlet in self._outlets.values():
+            outlet.close()
         self._outlets.clear()
-        return names
+
+    def close_boards(self) -> None:
+        """Close all boards for their readers; the session withdraws the rest."""
+        for outlet in self._outlets.values():
+            if outlet.board is not None:
+                outlet.board.close()
 
     def _declare(self, address: str, conversation: Conversation, now_s: float, boards: HostBoards | None) -> Outlet:
         name, quality = key(self._mission, address, conversation), self._quality_of(address, conversation)

@@ -359,14 +359,3 @@ async def test_who_publishes_under_ever_new_addresses_does_not_grow() -> None:
             assert heard[:301] == [*map(str, range(300)), "0"]
         finally:
             await bus.close()
-
-
-async def test_a_bus_that_closes_withdraws_its_publishers_because_the_hub_would_keep_their_keys() -> None:
-    endpoint = free_endpoint()
-    async with hub_at(endpoint):
-        session = CountedSession(zenoh_bus.open_session(client_config(endpoint)))
-        bus = ZenohBus("hostile", SERVER, CLOCK, session)  # type: ignore[arg-type]
-        for conversation in (Conversation.STATUS, Conversation.LOG, Conversation.EVENTS):
-            bus.publish(SERVER, conversation, Stop("last words"))
-        await bus.close()
-        assert session.standing == 0
