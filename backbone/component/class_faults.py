@@ -1,7 +1,7 @@
 """Faults of a component's class that show without an instance of it.
 
-A method that is async where the base class is not would do nothing, as nobody awaits it. An object whose base class was
-not made lacks its attributes. Parameters that only the type checker knows would never be read.
+A caller that expects a plain method does not await an async one, which then does nothing. An object lacks attributes if
+its constructor does not call that of the base class. Parameters that only the type checker knows are never read.
 """
 
 from __future__ import annotations

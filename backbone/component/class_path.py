@@ -9,7 +9,7 @@ from backbone.component.component import AnyComponent, Component
 from backbone.errors import Refusal
 
 SHIPPED = ("backbone.", "mission_control.", "resource_pool.")
-"""Packages whose classes tests have judged: a judgment takes a millisecond of each start."""
+"""Packages of this project. Tests have judged their classes, because a judgment takes a millisecond of each start."""
 
 
 class WrongClassPath(Refusal):

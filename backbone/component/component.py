@@ -34,7 +34,7 @@ from backbone.component.messages import (
 )
 from backbone.component.name_claim import claim_name
 from backbone.component.own_tasks import OwnTasks
-from backbone.component.parameter_values import parameters_of
+from backbone.component.parameter_values import parameters_from
 from backbone.component.story import StoryBook, feedback_of
 from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
@@ -119,7 +119,7 @@ class Component(Generic[P_co]):
         """``<subsystem>/<name>``."""
         self.pid = os.getpid()
         """Pid of its process. A simulation, where many components share one process, sets other numbers."""
-        self.parameters: P_co = cast(P_co, parameters_of(launch.parameters, self.parameters_type))
+        self.parameters: P_co = cast(P_co, parameters_from(launch.parameters, self.parameters_type))
         self.story = StoryBook(self.address, clock)
         self.feedback = ""
         self._state, self._since_s = LifeState.CONNECTING, clock.now_s()
@@ -230,7 +230,7 @@ class Component(Generic[P_co]):
 
     def with_parameters(self, changed: Mapping[str, object]) -> P_co:
         """Return the parameters with these values replaced, or raise ``WrongParameter``."""
-        return cast(P_co, parameters_of({**msgspec.to_builtins(self.parameters), **changed}, self.parameters_type))
+        return cast(P_co, parameters_from({**msgspec.to_builtins(self.parameters), **changed}, self.parameters_type))
 
     def change_parameters(self, changed: Mapping[str, object]) -> None:
         """Replace these parameters, unless the values do not fit or ``parameters_changed`` refuses them."""

@@ -9,7 +9,7 @@ import msgspec
 from backbone.component.messages import WrongParameter
 
 
-def parameters_of(values: Mapping[str, object], kind: type[msgspec.Struct]) -> msgspec.Struct:
+def parameters_from(values: Mapping[str, object], kind: type[msgspec.Struct]) -> msgspec.Struct:
     """Return the values as this class, or raise ``WrongParameter``."""
     try:
         return msgspec.convert(values, kind)

@@ -162,7 +162,7 @@ class Follower:
             case _Schema.CONNECT if _address_in(message.key) == self._its:
                 self._asked = revived(Connect, message.body)
             case _Schema.SCHEDULE if not self._is_holder_known:
-                self._is_holder_known = True  # later grants are told by the RC
+                self._is_holder_known = True  # the RC publishes each later grant
                 for holder in _holders(revived(Schedule, message.body), self._robot):
                     self._begin(holder.arc, holder.epoch)
             case _Schema.FRAME if self._arc and _fields(message).get("arc") == self._arc:

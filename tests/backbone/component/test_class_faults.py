@@ -1,4 +1,4 @@
-"""A class whose methods nobody could call as the base class's are called is refused before it starts."""
+"""A class is refused before its start if its methods cannot be called like those of its base class."""
 
 from __future__ import annotations
 

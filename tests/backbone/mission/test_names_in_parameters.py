@@ -59,7 +59,7 @@ def test_a_name_that_nothing_has_is_refused(tmp_path: Path, text: str, message: 
     [
         go_to("world"),
         go_to("resource_pool/localizer"),
-        go_to("ui_console/somebody"),
+        go_to("ui_console/console-9"),
         motion_of("*"),
         motion_of("watch-scout2"),
         motion_of("creator-base"),

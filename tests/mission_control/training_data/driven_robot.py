@@ -20,7 +20,7 @@ WIDTH_PX, HEIGHT_PX = 4, 2
 
 
 def known(at_s: float, *holders: Holder) -> list[Said]:
-    """Return what tells whose the ARCs are: the schedule, with the robot's holders, and anna at the console."""
+    """Return messages that name the owners of the ARCs: a schedule with the robot's holders, and anna's console."""
     requests = [
         RequestView(arc, owner, RequestState.WAITING, ["scout1"], 0.0, -1.0, -1.0, "", [], 5.0, "night:1", 0)
         for arc, owner in ARCS.items()

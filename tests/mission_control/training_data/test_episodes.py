@@ -36,7 +36,7 @@ nights = st.lists(st.tuples(st.floats(0.02, 0.5), happenings), max_size=25)
 def followed(
     said: Iterable[Said], cameras: Iterable[str] | None = None, first: Iterable[Said] = ()
 ) -> tuple[Survey, Follower, list[EpisodeStep]]:
-    """Return what a robot did in a recording of these messages; ``first`` tells whose the ARCs are."""
+    """Return what a robot did in a recording of these messages; ``first`` names the owners of the ARCs."""
     file = recorded([*(first or known(0.1)), *said])
     found = survey(Recording(file).messages(keys_of("scout1")), "scout1")
     follower = Follower("scout1", found.reports, found.sizes_px if cameras is None else cameras, RATE_HZ)

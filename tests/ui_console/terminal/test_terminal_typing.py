@@ -1,4 +1,4 @@
-"""Whatever a terminal sends, its screen goes on, and only keys are keys."""
+"""A screen continues after any input of its terminal, and only keys act as keys."""
 
 from __future__ import annotations
 
