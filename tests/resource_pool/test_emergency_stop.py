@@ -7,18 +7,15 @@ import math
 import random
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from pathlib import Path
 from typing import Any
 
 import pytest
-from pool_on_local_network import HARDWARE, Pool, a_pool
+from pool_on_local_network import Pool, a_pool
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.inbox import reader_of
 from backbone.bus.interface import Bus
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.launch import Launch
-from backbone.naming import Subsystem
 from backbone.ranges import LONGEST_LEASE_S
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected
 from backbone.scheduling.requests import RcUse, Usage
@@ -26,7 +23,6 @@ from backbone.wire import Envelope, Message, write
 from resource_pool.arc_client import EmergencyStopped, StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.commands import Drive, Jump
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, LoadPacket, NotFromYou, NoTurnSoon, PacketLoaded
-from resource_pool.rcs.scout import Scout
 from resource_pool.stop_messages import EmergencyStop, GivenBeforeStop, OtherStop
 from scout_model.radio_link import encode_drive, encode_halt, encode_jump, encode_transmitter_on
 
@@ -36,22 +32,6 @@ OPERATOR = "ui_console/console-1"
 
 def payloads(pool: Pool, network_id: int) -> list[bytes]:
     return [packet.payload for packet in pool.radio_driver.heard_by(network_id)]
-
-
-def scout_launch(run_directory: Path, host: str = "local") -> Launch:
-    return Launch(
-        "local",
-        Subsystem.RESOURCE_POOL,
-        "scout1",
-        "scout",
-        "x:Y",
-        host,
-        "",
-        0.0,
-        1.0,
-        HARDWARE[0].rc_parameters(),
-        run_directory=str(run_directory),
-    )
 
 
 # ---------------------------------------------------------------------- the robot
@@ -165,65 +145,6 @@ def test_a_stop_the_radio_does_not_take_is_told_as_unconfirmed_and_the_robot_sta
             await pool.clock.sleep_s(1.0)
             assert await pool.pose("scout1") == pytest.approx(stood, abs=1e-3)
             assert stood != pytest.approx(began, abs=1e-2)
-
-    run_virtual(main())
-
-
-def test_a_stop_outlives_the_process_of_the_robots_rc(local_mission: Any, beside: Any, tmp_path: Path) -> None:
-    async def main() -> None:
-        async with a_pool(local_mission, ["radio"]) as pool:
-            launch = scout_launch(tmp_path)
-            operator = pool.voice_of(OPERATOR)
-            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
-                stop = await stop_robot(operator, "scout1", "fire", "anna")
-            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
-                assert await ask_stop(operator, "scout1") == stop
-                await lift_stop(operator, stop)
-            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
-                assert not (await ask_stop(operator, "scout1")).is_stopped
-
-    run_virtual(main())
-
-
-def test_a_stop_stays_in_force_on_another_host(local_mission: Any, beside: Any, tmp_path: Path) -> None:
-    """Host b was the robot's before, and knows an older stop that was lifted there."""
-
-    async def main() -> None:
-        async with a_pool(local_mission, ["radio"]) as pool:
-            here, there = scout_launch(tmp_path / "a"), scout_launch(tmp_path / "b", "b")
-            operator = pool.voice_of(OPERATOR)
-
-            def scout(launch: Launch) -> Scout:
-                return Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)
-
-            async with beside(scout(there)):
-                await lift_stop(operator, await stop_robot(operator, "scout1", "smoke", "ben"))
-            async with beside(scout(here)):
-                await stop_robot(operator, "scout1", "", "ben")
-                stop = await stop_robot(operator, "scout1", "fire", "anna")
-                await pool.clock.sleep_s(0.1)
-            async with beside(scout(there)):
-                state = await ask_stop(operator, "scout1")
-                assert (state.is_stopped, state.number, state.by) == (True, stop.number, "ben, anna")
-                await lift_stop(operator, state)
-                await pool.clock.sleep_s(0.1)
-            async with beside(scout(scout_launch(tmp_path / "c"))):
-                assert not (await ask_stop(operator, "scout1")).is_stopped
-
-    run_virtual(main())
-
-
-def test_a_full_disk_keeps_no_wheel_turning_and_it_is_told_that_the_stop_is_not_kept(
-    local_mission: Any, beside: Any, tmp_path: Path
-) -> None:
-    (tmp_path / "stops").touch()  # no folder can be made there
-
-    async def main() -> None:
-        async with a_pool(local_mission, ["radio"]) as pool:
-            launch = scout_launch(tmp_path)
-            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)) as scout:
-                assert (await stop_robot(pool.voice_of(OPERATOR), "scout1", "fire", "anna")).is_stopped
-                assert any("will not know that scout1 is stopped" in one.what for one in scout.story.of("scout1"))
 
     run_virtual(main())
 

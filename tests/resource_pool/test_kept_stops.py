@@ -1,0 +1,104 @@
+"""A robot stays stopped if the process of its RC ends, also if the next one starts on another host."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pool_on_local_network import HARDWARE, a_pool
+
+from backbone.bus.clock import run_virtual
+from backbone.component.launch import Launch
+from backbone.naming import Subsystem
+from resource_pool.arc_client import ask_stop, lift_stop, stop_robot
+from resource_pool.rcs.scout import Scout
+from resource_pool.stop_file import StopFile
+
+OPERATOR = "ui_console/console-1"
+
+
+def scout_launch(run_directory: Path, host: str = "local") -> Launch:
+    return Launch(
+        "local",
+        Subsystem.RESOURCE_POOL,
+        "scout1",
+        "scout",
+        "x:Y",
+        host,
+        "",
+        0.0,
+        1.0,
+        HARDWARE[0].rc_parameters(),
+        run_directory=str(run_directory),
+    )
+
+
+def test_a_stop_outlives_the_process_of_the_robots_rc(local_mission: Any, beside: Any, tmp_path: Path) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"]) as pool:
+            launch = scout_launch(tmp_path)
+            operator = pool.voice_of(OPERATOR)
+            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
+                stop = await stop_robot(operator, "scout1", "fire", "anna")
+            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
+                assert await ask_stop(operator, "scout1") == stop
+                await lift_stop(operator, stop)
+            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
+                assert not (await ask_stop(operator, "scout1")).is_stopped
+
+    run_virtual(main())
+
+
+def test_a_stop_stays_in_force_on_another_host(local_mission: Any, beside: Any, tmp_path: Path) -> None:
+    """Host b was the robot's before, and knows an older stop that was lifted there."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"]) as pool:
+            here, there = scout_launch(tmp_path / "a"), scout_launch(tmp_path / "b", "b")
+            operator = pool.voice_of(OPERATOR)
+
+            def scout(launch: Launch) -> Scout:
+                return Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)
+
+            async with beside(scout(there)):
+                await lift_stop(operator, await stop_robot(operator, "scout1", "smoke", "ben"))
+            async with beside(scout(here)):
+                await stop_robot(operator, "scout1", "", "ben")
+                stop = await stop_robot(operator, "scout1", "fire", "anna")
+                await pool.clock.sleep_s(0.1)
+            async with beside(scout(there)):
+                state = await ask_stop(operator, "scout1")
+                assert (state.is_stopped, state.number, state.by) == (True, stop.number, "ben, anna")
+                await lift_stop(operator, state)
+                await pool.clock.sleep_s(0.1)
+            async with beside(scout(scout_launch(tmp_path / "c"))):
+                assert not (await ask_stop(operator, "scout1")).is_stopped
+
+    run_virtual(main())
+
+
+def test_a_full_disk_keeps_no_wheel_turning_and_it_is_told_that_the_stop_is_not_kept(
+    local_mission: Any, beside: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "stops").touch()  # no folder can be made there
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"]) as pool:
+            launch = scout_launch(tmp_path)
+            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)) as scout:
+                assert (await stop_robot(pool.voice_of(OPERATOR), "scout1", "fire", "anna")).is_stopped
+                assert any("will not know that scout1 is stopped" in one.what for one in scout.story.of("scout1"))
+
+    run_virtual(main())
+
+
+def test_a_stop_file_that_cannot_be_read_counts_as_a_stop(tmp_path: Path) -> None:
+    file = StopFile(str(tmp_path), "scout1")
+    assert file.read() is None
+    (tmp_path / "stops").mkdir()
+    (tmp_path / "stops/scout1").write_bytes(b"half of a")
+    (tmp_path / "stops/scout2").mkdir()
+    for each in (file, StopFile(str(tmp_path), "scout2")):
+        state = each.read()
+        assert state is not None
+        assert state.is_stopped
