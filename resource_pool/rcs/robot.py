@@ -304,7 +304,8 @@ class RobotRc(ResourceController[P], Generic[P]):
         self.bus.publish(self.address, Conversation.MOTIONS, halted)
 
     def _publish_stop(self) -> None:
-        self.changed()
+        """Publish the stop before its operator has the answer: this host may die the next moment."""
+        self.publish_news()  # the nameserver keeps the stop for an RC on another host
         self.bus.publish(self.address, Conversation.EVENTS, self._latch.state)
 
     def _keep_stop(self) -> None:

@@ -9,7 +9,10 @@ from pool_on_local_network import HARDWARE, a_pool
 
 from backbone.bus.clock import run_virtual
 from backbone.component.launch import Launch
+from backbone.component.messages import ComponentState, StandingStop
+from backbone.keys import Conversation
 from backbone.naming import Subsystem
+from backbone.wire import Envelope
 from resource_pool.arc_client import ask_stop, lift_stop, stop_robot
 from resource_pool.rcs.scout import Scout
 from resource_pool.stop_file import StopFile
@@ -73,6 +76,27 @@ def test_a_stop_stays_in_force_on_another_host(local_mission: Any, beside: Any, 
                 await pool.clock.sleep_s(0.1)
             async with beside(scout(scout_launch(tmp_path / "c"))):
                 assert not (await ask_stop(operator, "scout1")).is_stopped
+
+    run_virtual(main())
+
+
+def test_the_stop_is_published_before_its_operator_has_the_answer(local_mission: Any) -> None:
+    """Else it is lost on another host if the machine dies right after the answer."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"]) as pool:
+            operator = pool.voice_of(OPERATOR)
+            published: list[StandingStop | None] = []
+
+            def status(heard: Envelope[ComponentState]) -> None:
+                published.append(heard.body.stop)
+
+            operator.subscribe("resource_pool/scout1", Conversation.STATUS, ComponentState, status)
+            await pool.clock.sleep_s(1.0)
+            stop = await stop_robot(operator, "scout1", "fire", "anna")
+            assert [one and one.number for one in published[-1:]] == [stop.number]
+            await lift_stop(operator, stop)
+            assert published[-1] is None
 
     run_virtual(main())
 
