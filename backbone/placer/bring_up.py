@@ -71,7 +71,8 @@ class BringUp:
             except StartFailed as refusal:
                 self._refuse_unwanted(record)
                 if self._book.is_alive(record.host) or not tries_left:
-                    raise
+                    self._book.failed(name, self._clock.now_s())
+                    raise self._named(refusal, record.host) from refusal
                 self._note(name, f"was ended with {record.host}: {refusal.detail}")
                 continue
             except LinkError as error:
@@ -123,6 +124,11 @@ class BringUp:
                 await self._news.or_at(until_s)
             else:
                 return
+
+    def _named(self, refusal: StartFailed, host: str) -> StartFailed:
+        """Return the refusal with the name of its host, unless the mission has one host only."""
+        at = f"on {host}: " if len(self._book.hosts()) > 1 else ""
+        return StartFailed(f"{at}{refusal.detail}", remedy=refusal.remedy, **refusal.facts)
 
     def _refuse_unwanted(self, record: PlacementRecord) -> None:
         if record.unwanted:

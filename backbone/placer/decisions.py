@@ -66,6 +66,12 @@ class PlacementRecord:
         self.pid, self.suspect = pid, False
         self.missing_since_s, self.cause, self.doing = -1.0, "", ""
 
+    def is_on(self, host: str, pid: int, now_s: float) -> None:
+        """Record that this host's creator has the component."""
+        self.phase, self.missing_since_s = PlacementPhase.RUNNING, -1.0
+        self.host, self.pid, self.since_s = host, pid, now_s
+        self.reasons, self.lost, self.suspect = (f"{host}: its creator has it",), False, False
+
     def misses(self, cause: str, now_s: float) -> None:
         """Record that the component, which ran, is missing."""
         self.phase, self.host, self.pid, self.suspect = PlacementPhase.WAITING, "", 0, False

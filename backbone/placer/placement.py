@@ -7,6 +7,7 @@ Rules:
 * Members of a shared process go to the host of its first member, unless the order names a host.
 * Among the possible hosts the placer chooses the host with the least load: components per core, with a busy processor
   counted as further components. So equal hosts get equal numbers of components, and a busy host gets fewer.
+* A host on which a component of this type did not start comes after all others, because the class may be missing there.
 * Hosts of equal load are chosen in the order of their names, so the same state gives the same choice.
 * Every answer, also a refusal, has one line for every host.
 
@@ -37,6 +38,7 @@ class CandidateHost:
         components: Number of its components, starting ones included.
         cpu: Busy share of all cores, 0 to 1, as last published by its creator.
         memory: Used share of memory, 0 to 1.
+        failed_s: Mission time at which a component of this type last failed to start here; negative: none did.
     """
 
     name: str
@@ -46,6 +48,7 @@ class CandidateHost:
     cpu: float = 0.0
     memory: float = 0.0
     cores: int = 1
+    failed_s: float = -1.0
 
     @property
     def load(self) -> float:
@@ -91,7 +94,7 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[CandidateH
     able = [host for host in known if not obstacles[host.name]]
     if not able:
         raise NoHost(_no_host(name, pin, known, obstacles), name=name)
-    chosen = min(able, key=lambda host: (host.load, host.name))
+    chosen = min(able, key=lambda host: (host.failed_s, host.load, host.name))
 
     def reason(host: CandidateHost) -> str:
         if host is chosen:
@@ -99,6 +102,8 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[CandidateH
             return f"{host.name}: chosen, {why}: {host.describe()}"
         if obstacles[host.name]:
             return f"{host.name}: {obstacles[host.name]}"
+        if host.failed_s > chosen.failed_s:
+            return f"{host.name}: a component of this type did not start there"
         return f"{host.name}: {'more loaded' if host.load > chosen.load else 'as loaded'}: {host.describe()}"
 
     return Choice(chosen.name, tuple(reason(host) for host in known))

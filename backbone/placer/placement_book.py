@@ -65,6 +65,7 @@ class PlacementBook:
         self._left_behind: set[tuple[str, str]] = set()
         self._stopped: dict[str, str] = {}
         self._fences: dict[str, tuple[str, float]] = {}
+        self._failed_s: dict[tuple[str, str], float] = {}
 
     # ------------------------------------------------------------------ views
     def record(self, name: str) -> PlacementRecord:
@@ -201,15 +202,13 @@ class PlacementBook:
         """
         record = self.record(name)
         record.host = ""  # it must not count on the host that it leaves
-        choice = place(name, record.spawn.tags, record.pin, self.hosts(), colocation=self._colocation(record))
+        failed_s = self._failed_s
+        hosts = [replace(one, failed_s=failed_s.get((one.name, record.spawn.type), -1.0)) for one in self.hosts()]
+        choice = place(name, record.spawn.tags, record.pin, hosts, colocation=self._colocation(record))
         there = [one.spawn for one in self._records.values() if one is not record and one.host == choice.host]
         record.spawn = msgspec.structs.replace(record.spawn, process=joined(record.spawn, there, self._packs))
-        record.phase, record.host, record.reasons, record.since_s = (
-            PlacementPhase.STARTING,
-            choice.host,
-            choice.reasons,
-            now_s,
-        )
+        record.phase, record.host = PlacementPhase.STARTING, choice.host
+        record.reasons, record.since_s = choice.reasons, now_s
         record.pid, record.lost = 0, False
         return choice
 
@@ -218,6 +217,12 @@ class PlacementBook:
         record = self.record(name)
         record.phase, record.since_s = PlacementPhase.RUNNING, now_s
         record.runs(pid)
+        self._failed_s.pop((record.host, record.spawn.type), None)
+
+    def failed(self, name: str, now_s: float) -> None:
+        """Record that the component did not start on its host: other hosts come first for its type."""
+        record = self.record(name)
+        self._failed_s[record.host, record.spawn.type] = now_s
 
     def unsure(self, name: str, now_s: float) -> None:
         """Record that it is unknown whether the component runs; its creator's next list decides."""
@@ -256,6 +261,7 @@ class PlacementBook:
         for process in processes:
             instructions += self._found(host, process, asked_s)
         self._left_behind = {(where, name) for where, name in self._left_behind if where != host}
+        self._failed_s = {at: at_s for at, at_s in self._failed_s.items() if at[0] != host}
         instructions += self.inspected(host, processes, asked_s)
         return instructions + [
             PlaceAgain(record.spawn.name)
@@ -366,13 +372,13 @@ class PlacementBook:
             self._remember_number(spawn)
             record = PlacementRecord(spawn, host if spawn.pinned else "", PlacementPhase.RUNNING, host, asked_s)
             self._records[spawn.name] = record
-            _adopt(record, host, process, asked_s)
+            record.is_on(host, process.pid, asked_s)
             return [Note(spawn.name, f"was found on {host}")]
         if record.host == host:
             return []
         is_meant = record.lost or (not record.host and record.pin in ("", host) and _are_alike(record.spawn, spawn))
         if is_meant and not record.unwanted:
-            _adopt(record, host, process, asked_s)
+            record.is_on(host, process.pid, asked_s)
             return [Note(spawn.name, f"came back with {host}")]
         return [EndOrphan(host, spawn.name), Note(spawn.name, f"came back with {host}, but is wanted elsewhere")]
 
@@ -391,10 +397,3 @@ def _are_alike(one: Spawn, other: Spawn) -> bool:
         other.class_path,
         other.parameters,
     )
-
-
-def _adopt(record: PlacementRecord, host: str, process: ProcessState, asked_s: float) -> None:
-    """Accept a creator's process as the one that this record wants."""
-    record.phase, record.missing_since_s = PlacementPhase.RUNNING, -1.0
-    record.host, record.pid, record.since_s = host, process.pid, asked_s
-    record.reasons, record.lost, record.suspect = (f"{host}: its creator has it",), False, False

@@ -111,6 +111,17 @@ def test_a_host_with_full_memory_is_the_last_choice_but_one() -> None:
     assert place("c", [], "", [CandidateHost("alpha", memory=0.95)]).host == "alpha"
 
 
+def test_a_host_on_which_the_type_did_not_start_is_the_last_choice_but_still_one() -> None:
+    failed = CandidateHost("alpha", failed_s=3.0)
+    choice = place("c", [], "", [failed, CandidateHost("beta", cpu=1.0, components=9)])
+    assert choice.host == "beta"
+    assert choice.reasons[0] == "alpha: a component of this type did not start there"
+    assert place("c", [], "", [failed]).host == "alpha"
+    assert place("c", [], "", [failed, CandidateHost("beta", failed_s=2.0)]).host == "beta", (
+        "the one that failed earlier"
+    )
+
+
 def test_a_refusal_names_every_host_and_why_not() -> None:
     views = [
         CandidateHost("alpha"),

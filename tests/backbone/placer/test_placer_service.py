@@ -195,6 +195,29 @@ async def test_a_wanted_component_that_its_creator_does_not_have_is_placed_again
     assert await one.absent() == []
 
 
+@on("a", "b")
+async def test_what_does_not_start_on_one_host_starts_on_the_other(one: Mission) -> None:
+    one.creators["a"].fails = ["w"] * 20
+    with pytest.raises(StartFailed, match="on a: w did not become ready"):
+        await one.start("watcher", "w")
+    assert (await one.start("watcher", "w")).host == "b"
+    assert (await one.start("watcher", "v")).host == "b", "a may lack the class, although it has less to do"
+    assert one.creators["a"].spawns == ["w"]
+
+
+@on("b")
+async def test_what_is_lost_with_its_host_is_placed_where_it_can_start(one: Mission) -> None:
+    await one.start("watcher", "w")
+    for host in ("a", "c"):
+        await one.begin_creator(host)
+    one.creators["a"].fails = ["w"] * 20
+    await one.start("watcher", "v", host="c")
+    await one.crash("creator-b")
+    await one.clock.sleep_s(12.0)
+    assert await one.placements() == {"v": "c", "w": "c"}
+    assert one.creators["a"].spawns == ["w"]
+
+
 @on("a")
 async def test_what_cannot_be_placed_is_reported_as_absent_with_its_cause(one: Mission) -> None:
     await one.start("watcher", "w")
