@@ -16,6 +16,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskTime, MissionTime
+from backbone.errors import NoResponder
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 ASKED_TIMES = 5  # chosen: the quickest of a few answers is within a millisecond
@@ -60,12 +61,14 @@ async def clock_elsewhere(mission: str, endpoint: str, source: str, secret: str 
 
     Raises:
         HubUnreachable: No hub listens at the endpoint.
-        LinkError: The nameserver did not answer.
+        LinkError: The nameserver did not answer, or the hub belongs to another mission.
     """
     config = client_config(endpoint, secret)
     bus = await ZenohBus.open_when_up(mission, source, MissionClock.started_now(), config)
     try:
         return await mission_clock(bus)
+    except NoResponder as error:
+        raise NoResponder(f"the hub at {endpoint} has no mission {mission}, or is just starting") from error
     finally:
         await bus.close()
 
