@@ -16,7 +16,7 @@ from backbone.bus.interface import Bus
 from backbone.component.messages import Absence, AskTime, MissionTime
 from backbone.component_database.messages import ListTypes, TypeCount, Types
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.creator.messages import ListProcesses, Processes, ProcessState
+from backbone.creator.messages import ListProcesses, Processes, ProcessState, offer_name
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import component_of
@@ -62,13 +62,16 @@ async def look(
         return before
     listed(listing)
     picture = before or MissionPicture(bus.mission, rate=rate)
-    keepers = sorted({LAUNCHER, *(one.address for one in listing.components if one.type == CREATOR)})
+    there = {component_of(one.address) for one in listing.components}
+    creators = {one.address: one.host for one in listing.components if one.type == CREATOR}
+    offered = {at: host if offer_name(host) in there else "" for at, host in sorted(creators.items())}
     answers = await asyncio.gather(
         _ask_or_absence(bus, now_s, RC_MANAGER, AskSchedule(), Schedule)
         if schedule
         else _ask_or_absence(bus, now_s, RC_MANAGER, AskTime(), MissionTime),
         _ask_or_absence(bus, now_s, PLACER, AskTime(), MissionTime),
-        *(_ask_or_absence(bus, now_s, keeper, ListProcesses(), Processes) for keeper in keepers),
+        *(_ask_or_absence(bus, now_s, at, ListProcesses(), Processes, host) for at, host in offered.items()),
+        _ask_or_absence(bus, now_s, LAUNCHER, ListProcesses(), Processes),
     )
     picture.at_s, picture.schedule, picture.processes, picture.stale_since_s = now_s, None, {}, None
     for said in (listing, *answers):
@@ -103,12 +106,24 @@ def _gone_stale(picture: MissionPicture, silence: Absence, now_s: float) -> None
 
 
 async def _ask_or_absence(
-    bus: Bus, now_s: float, address: str, question: Message, reply: type[Schedule | MissionTime | Processes]
+    bus: Bus,
+    now_s: float,
+    address: str,
+    question: Message,
+    reply: type[Schedule | MissionTime | Processes],
+    offered: str = "",
 ) -> Schedule | MissionTime | Processes | Absence:
-    """Return the answer, or the absence of the component that did not answer."""
+    """Return the answer, or the absence of the component that did not answer.
+
+    Args:
+        offered: The host whose offer keeps the component; empty: the launcher keeps it.
+    """
     try:
         return printable_all(await bus.ask(address, question, reply, within_s=LOOK_TIME_S))
     except (Refusal, LinkError) as error:
+        if offered:  # a slow link hides it as well as a fault; the mission's own services are sound
+            doing, remedy = f"{offered} restarts it if it hangs", f"If it stays silent, check the link to {offered}."
+            return Absence(component_of(address), now_s, f"no answer: {error}", doing, remedy)
         launched = address != LAUNCHER
         doing = "the launcher restarts it" if launched else "it may answer again; nothing restarts a launcher"
         remedy = "" if launched else "If it stays silent: 'scout-backbone down', then 'up' again."
