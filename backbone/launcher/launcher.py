@@ -246,6 +246,8 @@ class Launcher(Component[NoParameters]):
             await self._stop_consoles()
         async with self._step("stop mission"):
             await self._stop_mission()
+        for host in self._others.lost:
+            self._observer.announce(f"{host} is out of reach: end a command that still offers it there with Ctrl-C")
         if self._others.offering:
             async with self._step("stop creators of other hosts"):
                 await self._stop_other_hosts()

@@ -39,6 +39,7 @@ def command_on(host: Host, description: MissionDescription, record: Path | None 
 class _Absent:
     since_s: float
     cause: str
+    was_there: bool = True
 
 
 class OtherHosts:
@@ -55,13 +56,20 @@ class OtherHosts:
         """Names of all other machines, in the order of the mission file."""
         self._creators = {address(Subsystem.BACKBONE, creator_name(host)): host for host in self._commands}
         self._offers = {address(Subsystem.BACKBONE, offer_name(host)) for host in self._commands}
-        self._absent = {host: _Absent(now_s, "it was not offered to the mission yet") for host in self._commands}
+        self._absent = {
+            host: _Absent(now_s, "it was not offered to the mission yet", was_there=False) for host in self._commands
+        }
         self._offering: set[str] = set()
 
     @property
     def missing(self) -> list[str]:
         """Names of the machines without a creator in the mission."""
         return [host for host in self._commands if host in self._absent]
+
+    @property
+    def lost(self) -> list[str]:
+        """Names of the machines that had a creator in the mission and have none now."""
+        return [host for host in self.missing if self._absent[host].was_there]
 
     @property
     def offering(self) -> list[str]:

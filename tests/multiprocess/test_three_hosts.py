@@ -147,6 +147,25 @@ def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwh
         mission.wait("nothing is left", lambda: not mission.left(), GONE_WITHIN_S)
 
 
+@pytest.mark.thorough
+def test_down_names_a_host_that_is_cut_off_because_the_command_there_goes_on(short_path: Path) -> None:
+    with machines(short_path) as mission:
+        for host in ("near", "far"):
+            mission.type_what_up_prints(host)
+        mission.wait("all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), 90.0)
+        mission.hosts["far"].cut()
+        assert mission.type_on_base("scout-backbone", "down", "--mission", NAME).returncode == 0, mission.story()
+        assert mission.up.process.wait(20) == 0
+        mission.up.close()
+        told = [line for line in mission.up.lines if "is out of reach" in line]
+        assert [line.split()[0] for line in told] == ["far"], mission.story()
+        assert mission.offers["near"].process.wait(10) == 0, mission.story()
+        offer = mission.offers["far"].process
+        assert {p.pid for p in mission.hosts["far"].processes()} == {offer.pid}
+        offer.send_signal(signal.SIGINT)
+        assert offer.wait(8) in (0, 130)
+
+
 AMID_FIRST_IMPORT = "Fatal Python error: init_import_site"
 
 

@@ -46,6 +46,16 @@ def test_each_is_missed_until_its_creators_token_stands_and_again_when_it_falls(
     assert far.remedy == f"type there: {command_on(FAR, mission(BASE, FAR, ATTIC))}"
 
 
+def test_a_machine_is_lost_if_it_was_there_before() -> None:
+    others = OtherHosts(mission(BASE, FAR, ATTIC), 0.0)
+    assert others.lost == []
+    others.token_changed("backbone/creator-far", True, 1.0)
+    others.token_changed("backbone/creator-far", False, 2.0)
+    assert others.lost == ["far"]
+    others.token_changed("backbone/creator-far", True, 3.0)
+    assert others.lost == []
+
+
 def test_a_missing_machine_degrades_the_mission() -> None:
     others = OtherHosts(mission(BASE, FAR), 0.0)
     assert health({}, others.absences(), 100.0).word is HealthWord.DEGRADED
