@@ -21,7 +21,7 @@ _SENTENCES = {
     "packets": "its packets take longer than was declared",
     "failed": "it could not be made ready",
     WANTED: "no run time was wanted",
-    "silent": "this console gave no sign of life",
+    "silent": "this console or its ARC gave no sign of life",
     "lease": "the RC manager was silent for too long",
     "lost": "the ARC that held it for this console has ended",
 }
@@ -49,7 +49,7 @@ def why_lost(reason: str, by: str) -> str:
 
     Example:
         >>> why_lost("slice", "ben"), why_lost("silent", ""), why_lost("a fuse blew", "")
-        ('it is the turn of ben', 'this console gave no sign of life', 'a fuse blew')
+        ('it is the turn of ben', 'this console or its ARC gave no sign of life', 'a fuse blew')
     """
     sentence = _SENTENCES.get(reason)
     if sentence is not None:
