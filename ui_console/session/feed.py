@@ -47,6 +47,7 @@ from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_readings, watch_stops
 from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said, failed
 from ui_console.model.tree_board import is_behavior
+from ui_console.session.unanswered_stops import UnansweredStops
 
 log = logging.getLogger(__name__)
 
@@ -87,6 +88,8 @@ class ConsoleFeed:
         self.listed = asyncio.Event()
         """Set when every component has answered the first questions or timed out."""
         self._is_up = True
+        self.unanswered = UnansweredStops(clock, self._stop_again)
+        """Stops that no robot answered, to be run by its owner."""
 
     # ------------------------------------------------------------------ listening
     def listen(self) -> None:
@@ -113,7 +116,10 @@ class ConsoleFeed:
 
     # ------------------------------------------------------------------ verbs of an operator
     async def stop_robots(self, robots: Iterable[str], reason: str = "", user: str = "") -> list[str]:
-        """Stop these robots, all at once, regardless of their holders; return the robots without confirmation."""
+        """Stop these robots, all at once, regardless of their holders; return the robots without confirmation.
+
+        While ``unanswered`` runs, the stop of a robot that does not answer is repeated until it does.
+        """
         wanted = sorted(set(robots))
         answers = await asyncio.gather(*(self._stop(robot, reason, user) for robot in wanted))
         return [robot for robot, is_stopped in zip(wanted, answers, strict=True) if not is_stopped]
@@ -198,10 +204,25 @@ class ConsoleFeed:
             try:
                 stop = await stop_robot(self._bus, robot, reason, user, self._clock)
             except LinkError as error:
-                raise LinkError(f"{robot} did not confirm the stop: {error}") from error
+                self.unanswered.add(robot, reason, user)
+                unsure = f"{robot} did not confirm the stop, which this console repeats while it runs"
+                raise LinkError(f"{unsure}: {error}") from error
+            self.unanswered.answered(robot)
             self._hear(stop)
             return stop.is_stopped and stop.is_confirmed  # it may be lifted already, or its radio was silent
         return False
+
+    async def _stop_again(self, robot: str, reason: str, user: str) -> bool:
+        """Repeat a stop once; return whether it was answered."""
+        try:
+            stop = await stop_robot(self._bus, robot, reason, user)
+        except LinkError:
+            return False
+        except Refusal as refusal:
+            self._show(failed(self._clock.now_s(), refusal))
+            return True
+        self._hear(stop)
+        return True
 
     async def _resolve(self, name: str) -> str:
         resolved = await self._bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)

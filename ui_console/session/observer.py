@@ -103,7 +103,10 @@ class Observer(Component[P_co], Generic[P_co]):
 
     # ------------------------------------------------------------------ verbs that need no grant
     async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:
-        """Stop a robot, regardless of its holder; return whether the stop is confirmed."""
+        """Stop a robot, regardless of its holder; return whether the stop is confirmed.
+
+        If the robot does not answer, its stop is repeated until it does or this console ends.
+        """
         self.require_let_go()
         self.acted(OperatorAction.STOP_ROBOT, robot, reason, user)
         return not await self._carried_out(self.feed.stop_robots([robot], reason, user or self.user))
@@ -112,7 +115,7 @@ class Observer(Component[P_co], Generic[P_co]):
         """Stop all robots of the mission, regardless of their holders; return the robots whose stop is not confirmed.
 
         Known robots are stopped at once, before the nameserver is asked for further ones. If it does not answer, the
-        result names ``UNLISTED`` too.
+        result names ``UNLISTED`` too. The stop of a robot that does not answer is repeated as by ``stop_robot``.
         """
         self.require_let_go()
         known, user = self.feed.robots, user or self.user
@@ -161,6 +164,7 @@ class Observer(Component[P_co], Generic[P_co]):
     async def connect(self) -> None:
         """Subscribe to the mission's messages."""
         self.bus.watch_link(self._heard_link)
+        self.start_task(self.feed.unanswered.run(), "unanswered stops")
         if self._watches:
             self.feed.listen()
         if self.map is not None:

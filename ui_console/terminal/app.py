@@ -206,7 +206,7 @@ class ConsoleApp(ConsoleDisplay):
 
     async def _stop_robot(self, robot: str) -> None:
         if not await self._session.stop_robot(robot):
-            self.notify(f"{robot} did not confirm the stop", severity="error")
+            self.notify(f"{robot} did not confirm the stop; until it answers, it is sent again", severity="error")
         self.redraw()
 
     async def _stop_all(self) -> None:

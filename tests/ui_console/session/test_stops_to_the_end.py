@@ -94,6 +94,38 @@ def test_a_stop_outlasts_a_restart_of_the_robots_rc_and_of_the_nameserver(
     stage(scene)
 
 
+def test_a_stop_is_repeated_until_a_robot_that_was_cut_off_answers(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        anna, latch = on.consoles["anna"], on.robots[0].latch
+        away = on.network.servers.pop("resource_pool/scout1")
+        assert not await anna.stop_robot("scout1", "smoke")
+        await on.clock.sleep_s(300.0)
+        on.network.servers["resource_pool/scout1"] = away
+        await on.clock.sleep_s(2.0)
+        assert (latch.state.is_stopped, latch.state.by, latch.state.reason) == (True, "anna", "smoke")
+        assert await anna.lift_stop("scout1", latch.state.number)
+        await on.clock.sleep_s(300.0)
+        assert not latch.state.is_stopped
+
+    stage(scene)
+
+
+def test_a_stop_that_was_answered_is_not_repeated(stage: Callable[[Scene], None]) -> None:
+    """The operator pressed again: the second press counts for both."""
+
+    async def scene(on: Stage) -> None:
+        anna, latch = on.consoles["anna"], on.robots[0].latch
+        away = on.network.servers.pop("resource_pool/scout1")
+        assert not await anna.stop_robot("scout1")
+        on.network.servers["resource_pool/scout1"] = away
+        assert await anna.stop_robot("scout1")
+        assert await anna.lift_stop("scout1", latch.state.number)
+        await on.clock.sleep_s(10.0)
+        assert not latch.state.is_stopped
+
+    stage(scene)
+
+
 def test_a_known_robot_that_hangs_does_not_delay_the_stop_of_an_unknown_one(
     stage: Callable[[Scene], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
