@@ -83,8 +83,9 @@ class ConsoleApp(ConsoleDisplay):
         self._session.steer(*DIRECTIONS[direction], self.speed)
 
     def on_drive_pad_dragged(self, message: DrivePad.Dragged) -> None:
-        """Drive by the pad."""
+        """Drive by the pad, and ask whether the terminal is still there."""
         self._session.steer(message.forward, message.right, self.speed, STICK_LASTS_S)
+        self.ask_terminal()
 
     def on_drive_pad_released(self, _message: DrivePad.Released) -> None:
         """Stop the wheels now."""

@@ -14,7 +14,7 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
-from textual.events import Resize, Unmount
+from textual.events import CursorPosition, Resize, Unmount
 from textual.screen import Screen
 from textual.widgets import Static
 
@@ -37,6 +37,7 @@ TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
 LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which an old view must be marked
 NO_PICTURES = "no pictures: this kind of ARC has no camera or no framegrabber"
+UNANSWERED = "the pad let go: the terminal did not answer for a second. Press anew, and keep the mouse moving."
 NARROW_COLUMNS = 70  # chosen: below, picture and tables side by side are both too small
 
 
@@ -148,6 +149,16 @@ class ConsoleDisplay(EndingApp):
     def on_resize(self, _event: Resize) -> None:
         """Adapt the layout to the new size."""
         self.call_after_refresh(self.redraw)
+
+    def on_cursor_position(self, _event: CursorPosition) -> None:
+        """Tell the drag pad that the terminal answers."""
+        main = self._main()
+        if main is not None:
+            main.query_one(DrivePad).answered()
+
+    def on_drive_pad_unanswered(self, _message: DrivePad.Unanswered) -> None:
+        """Show why the pad let go."""
+        self.notify(UNANSWERED, severity="warning")
 
     async def on_unmount(self, _event: Unmount) -> None:
         """Notify the session that the screen ended, as soon as no emergency stop is under way."""

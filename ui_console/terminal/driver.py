@@ -19,6 +19,7 @@ from textual.events import Key
 READ_MOST_BYTES = 4096  # as Textual's driver
 TICK_S = 0.1  # as Textual's driver: an escape key is known by the pause after it
 ESCAPE = "\x1b"
+ASK_POSITION = "\x1b[6n"  # ECMA-48, 8.3.35: device status report; terminals of any age answer
 SEQUENCE = re.compile(r"\x1b[\[O][ -?]*[@-~]?")  # ECMA-48, 5.4: CSI and SS3, whole or its beginning
 
 
@@ -56,6 +57,11 @@ class TerminalDriver(LinuxDriver):
             self._must_signal_resume = True
             self.suspend_application_mode()
         super().start_application_mode()  # type: ignore[no-untyped-call]  # Textual declares no types here
+
+    def ask_position(self) -> None:
+        """Ask the terminal for the position of its cursor, unless a multiplexer would answer in its place."""
+        if not (os.environ.get("TMUX") or os.environ.get("STY")):
+            self.write(ASK_POSITION)
 
     def run_input_thread(self) -> None:
         """Read keys until the screen ends."""

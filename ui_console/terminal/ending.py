@@ -24,6 +24,11 @@ class EndingApp(App[None]):
         self._is_ending = True
         super().exit(result, return_code or self.return_code or 0, message)
 
+    def ask_terminal(self) -> None:
+        """Ask the terminal for its cursor: a terminal that is still there answers by a ``CursorPosition``."""
+        if isinstance(self._driver, TerminalDriver):
+            self._driver.ask_position()
+
     async def on_event(self, event: Event) -> None:
         """Process an event; while the screen ends, drop keys and mouse events."""
         if not (self._is_ending and isinstance(event, InputEvent)):

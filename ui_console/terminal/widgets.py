@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -23,6 +24,7 @@ from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send
 from ui_console.terminal.video import fit, row_segments, shrink
 
 SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``
+ANSWERED_WITHIN_S = 1.0  # chosen: as for pictures, by which nobody must drive when they are older
 CURSOR = Style(reverse=True)
 OLD = Style(bold=True, color="white", bgcolor="red")
 
@@ -169,10 +171,13 @@ class DrivePad(Widget):
     """A square for dragging with the mouse: up is faster, sideways turns; releasing stops the wheels.
 
     The only control of a terminal that reports its release, apart from a gamepad.
+
+    Law: the pad lets go if the terminal shows no sign of life for ``ANSWERED_WITHIN_S``, neither by the mouse nor by
+    ``answered``. The release of a terminal that is cut off would never arrive.
     """
 
     class Dragged(Message):
-        """The pad is being dragged; repeated every ``SAY_EVERY_S``.
+        """The pad is being dragged; repeated every ``SAY_EVERY_S``, to be answered by ``answered``.
 
         Attributes:
             forward: −1 to 1, as of a stick.
@@ -186,9 +191,13 @@ class DrivePad(Widget):
     class Released(Message):
         """The pad was released."""
 
+    class Unanswered(Message):
+        """The pad let go, because the terminal showed no sign of life."""
+
     def __init__(self) -> None:
         super().__init__(id="pad")
         self._at: tuple[float, float] | None = None
+        self._answered_s = 0.0
         self._saying: Timer | None = None
         self.border_title = "drag to drive"
 
@@ -214,9 +223,13 @@ class DrivePad(Widget):
         self._let_go()
 
     def let_go(self) -> None:
-        """Stop, because the window lost the focus and the pad would get no release of the mouse."""
+        """Stop, because the release of the mouse would not arrive: the window lost the focus, or does not answer."""
         self.release_mouse()
         self._let_go()
+
+    def answered(self) -> None:
+        """Record that the terminal answers, so the release of the mouse would arrive."""
+        self._answered_s = asyncio.get_running_loop().time()
 
     def render_line(self, y: int) -> Strip:
         """Return one row: a cross, and the position of the pointer."""
@@ -235,11 +248,17 @@ class DrivePad(Widget):
         forward = min(max(1 - event.y / half_height, -1.0), 1.0)
         right = min(max(event.x / half_width - 1, -1.0), 1.0)
         self._at = forward, right
+        self.answered()
         self.refresh()
         self._say()
 
     def _say(self) -> None:
-        if self._at is not None:
+        if self._at is None:
+            return
+        if asyncio.get_running_loop().time() > self._answered_s + ANSWERED_WITHIN_S:
+            self.let_go()
+            self.post_message(self.Unanswered())
+        else:
             self.post_message(self.Dragged(*self._at))
 
     def _let_go(self) -> None:

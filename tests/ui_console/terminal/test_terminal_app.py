@@ -10,7 +10,7 @@ from console_scenes import ASK, GRANT, SCHEDULE, held_model
 from pressed_keys import BACKWARD, FORWARD, KEYS, LEFT, MOST_M_S, RIGHT, SIZE
 from screen_text import screen_text
 from textual.binding import Binding
-from textual.events import AppBlur, AppFocus
+from textual.events import AppBlur, AppFocus, CursorPosition
 from written_session import WrittenSession, settle
 
 from ui_console.model.arc_abilities import ArcAbilities, Reach
@@ -25,7 +25,7 @@ from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.keys import DRIVES
 from ui_console.terminal.keys import KEYS as KEYS_OF_THE_CONSOLE
 from ui_console.terminal.tables import PanelName
-from ui_console.terminal.widgets import DrivePad
+from ui_console.terminal.widgets import ANSWERED_WITHIN_S, SAY_EVERY_S, DrivePad
 
 
 async def test_every_key_does_what_it_says() -> None:
@@ -173,6 +173,36 @@ async def test_dragging_in_the_pad_drives_until_it_is_let_go() -> None:
     assert lasts_s == STICK_LASTS_S
     assert drive.turn_rad_s == pytest.approx(0.0, abs=0.02)
     assert drive.forward_m_s > 0.5 * SPEED * MOST_M_S
+
+
+async def test_a_held_pad_lets_go_when_the_terminal_does_not_answer_for_a_second() -> None:
+    session = WrittenSession()
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.mouse_down(DrivePad, offset=(20, 1))
+        for _ in range(20):
+            await pilot.pause(0.1)
+            screen.post_message(CursorPosition(1, 1))
+        await pilot.pause()
+        assert session.wanted
+        assert "stop" not in session.wanted
+        await pilot.pause(ANSWERED_WITHIN_S + 2 * SAY_EVERY_S)
+        assert session.wanted[-1] == "stop"
+        assert "Press anew" in screen_text(screen)
+        session.wanted.clear()
+        screen.post_message(CursorPosition(1, 1))
+        await pilot.pause(0.5)
+        assert session.wanted == []
+
+
+async def test_the_mouse_alone_keeps_the_pad_of_a_terminal_that_never_answers() -> None:
+    session = WrittenSession()
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.mouse_down(DrivePad, offset=(20, 1))
+        for column in range(10, 16):
+            await pilot.pause(ANSWERED_WITHIN_S / 2)
+            await pilot.hover(DrivePad, offset=(column, 1))
+        assert "stop" not in session.wanted
 
 
 async def test_keys_and_pad_drive_within_the_reach_of_the_body_and_not_at_all_without_one() -> None:

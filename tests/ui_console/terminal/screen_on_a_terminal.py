@@ -1,0 +1,57 @@
+"""A screen in a process of its own, on a terminal that a test plays."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pty
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+WITHIN_S = 10.0
+
+
+@dataclass
+class PlayedTerminal:
+    """The test's end of the terminal, and the process at the other end."""
+
+    terminal: int
+    screen: subprocess.Popen[bytes]
+
+    def type(self, keys: bytes) -> None:
+        """Type these keys."""
+        os.write(self.terminal, keys)
+
+    def wait_shown(self, what: bytes) -> bytes:
+        """Return all bytes that arrived until these did."""
+        shown, deadline = b"", time.monotonic() + WITHIN_S
+        while what not in shown:
+            assert time.monotonic() < deadline, shown
+            if select.select([self.terminal], [], [], 1.0)[0]:
+                shown += os.read(self.terminal, 1 << 16)
+        return shown
+
+
+@contextlib.contextmanager
+def screen_on_a_terminal(program: str, **variables: str) -> Iterator[PlayedTerminal]:
+    """Run the program on a terminal of its own until the block ends, with these variables, outside a multiplexer."""
+    terminal, its_end = pty.openpty()
+    known = {name: value for name, value in os.environ.items() if name not in {"TMUX", "STY"}}
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        env={**known, "TERM": "xterm-256color", **variables},
+        stdin=its_end,
+        stdout=its_end,
+        stderr=its_end,
+        start_new_session=True,
+    ) as screen:
+        try:
+            yield PlayedTerminal(terminal, screen)
+        finally:
+            screen.kill()
+            os.close(its_end)
+            os.close(terminal)
