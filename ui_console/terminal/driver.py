@@ -6,18 +6,26 @@ of an unknown escape sequence for keys: shift and the 8 of some keypads would st
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import selectors
+import time
 from codecs import getincrementaldecoder
 from collections.abc import Iterable
 
 from textual._xterm_parser import XTermParser
+from textual.binding import Binding
 from textual.drivers.linux_driver import LinuxDriver
-from textual.events import Key
+from textual.events import Key, MouseDown, Paste
+from textual.message import Message
+
+from ui_console.terminal.keys import KEYS, action_of
 
 READ_MOST_BYTES = 4096  # as Textual's driver
 TICK_S = 0.1  # as Textual's driver: an escape key is known by the pause after it
+UNREAD_S = 0.5  # chosen: as long as the first press of a drive key counts
+STOPPING = {one.key for one in Binding.make_bindings(KEYS) if action_of(one) in {"stop_robot", "stop_all"}}
 ESCAPE = "\x1b"
 ASK_POSITION = "\x1b[6n"  # ECMA-48, 8.3.35: device status report; terminals of any age answer
 SEQUENCE = re.compile(r"\x1b[\[O][ -?]*[@-~]?")  # ECMA-48, 5.4: CSI and SS3, whole or its beginning
@@ -43,9 +51,14 @@ class KnownKeys(XTermParser):
 
 
 class TerminalDriver(LinuxDriver):
-    """Driver of a terminal in which a person may type anything."""
+    """Driver of a terminal in which a person may type anything.
+
+    Law: presses of keys and mouse have no effect if the process did not read for ``UNREAD_S``, because it was stopped;
+    only the keys of the emergency stop have.
+    """
 
     _is_reading = False
+    _read_s = math.inf
 
     def start_application_mode(self) -> None:
         """Begin to draw and to read keys.
@@ -72,19 +85,30 @@ class TerminalDriver(LinuxDriver):
             self._is_reading = False
 
     def _read(self) -> None:
+        self._read_s = min(self._read_s, time.monotonic())  # after a stop, the last time before it
         decode = getincrementaldecoder("utf-8")("replace").decode
         parser = KnownKeys()
         with selectors.SelectSelector() as keyboard:
             keyboard.register(self.fileno, selectors.EVENT_READ)
-            while not self.exit_event.is_set():
+            is_over = False
+            while not is_over:  # a last time after the end, because what is left unread is flushed
+                is_over = self.exit_event.is_set()
                 typed = b""
-                if keyboard.select(TICK_S) and not (typed := os.read(self.fileno, READ_MOST_BYTES)):
+                is_typed = keyboard.select(TICK_S) or keyboard.select(0)  # a signal may end the first one
+                if is_typed and not (typed := os.read(self.fileno, READ_MOST_BYTES)):
                     return  # the terminal was closed
+                before_s, self._read_s = self._read_s, time.monotonic()
+                is_late = self._read_s > before_s + UNREAD_S
                 for character in decode(typed):
                     try:
                         for event in parser.feed(character):
-                            self.process_message(event)
+                            self._pass_on(event, is_late=is_late)
                     except (ValueError, OverflowError):  # an escape sequence with an impossible number
                         parser = KnownKeys()
                 for event in parser.tick():
-                    self.process_message(event)
+                    self._pass_on(event, is_late=is_late)
+
+    def _pass_on(self, event: Message, *, is_late: bool) -> None:
+        is_stop = isinstance(event, Key) and event.key in STOPPING
+        if is_stop or not (is_late and isinstance(event, Key | MouseDown | Paste)):
+            self.process_message(event)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 
 import pytest
 from screen_on_a_terminal import WITHIN_S, screen_on_a_terminal
+
+from ui_console.terminal.driver import UNREAD_S
 
 pytestmark = pytest.mark.processes
 
@@ -16,12 +19,14 @@ from textual.widgets import Static
 from ui_console.terminal.ending import EndingApp
 
 class Screen(EndingApp):
-    BINDINGS = [("q", "quit", "end"), ("w", "drive", "drive")]
+    BINDINGS = [("q", "quit", "end"), ("w", "drive", "drive"), ("x", "stop", "stop")]
     def compose(self):
         yield Static("BEGUN")
     def action_drive(self):
         readers = [one for one in threading.enumerate() if one.name == "textual-input"]
         self.query_one(Static).update(f"READ-BY-{len(readers)}")
+    def action_stop(self):
+        self.query_one(Static).update("EMERGENCY")
 
 Screen().run()
 """
@@ -40,3 +45,17 @@ def test_a_screen_that_was_stopped_and_continued_reads_keys_and_ends(stop: signa
         played.type(b"q")
         played.wait_shown(b"\x1b[?1049l")  # the terminal's first screen
         assert played.screen.wait(WITHIN_S) == 0
+
+
+@pytest.mark.parametrize("stop", [signal.SIGSTOP, signal.SIGTSTP])
+def test_keys_typed_while_a_screen_was_stopped_are_dropped_but_not_the_emergency_stop(stop: signal.Signals) -> None:
+    with screen_on_a_terminal(PROGRAM) as played:
+        played.wait_shown(b"BEGUN")
+        played.screen.send_signal(stop)
+        os.waitid(os.P_PID, played.screen.pid, os.WSTOPPED | os.WNOWAIT)
+        played.type(b"xw\x1bOP\x1b[200~w\x1b[201~")
+        time.sleep(2 * UNREAD_S)
+        played.screen.send_signal(signal.SIGCONT)
+        assert b"READ-BY" not in played.wait_shown(b"EMERGENCY")
+        played.type(b"w")
+        played.wait_shown(b"READ-BY-1")
