@@ -1,4 +1,4 @@
-"""Reads the keys of a terminal; bytes that are no key do nothing.
+"""Reads the keys of a terminal, and writes the screen; bytes that are no key do nothing.
 
 Textual's driver ends the screen at a byte that is no UTF-8, or at a number that is too large, and takes the characters
 of an unknown escape sequence for keys: shift and the 8 of some keypads would stop a robot and take another one.
@@ -13,19 +13,25 @@ import selectors
 import time
 from codecs import getincrementaldecoder
 from collections.abc import Iterable
+from contextlib import suppress
+from pty import STDERR_FILENO
+from typing import Any
 
 from textual._xterm_parser import XTermParser
+from textual.app import App
 from textual.binding import Binding
 from textual.drivers.linux_driver import LinuxDriver
 from textual.events import Key, MouseDown, Paste
 from textual.message import Message
 
 from ui_console.terminal.keys import KEYS, action_of
+from ui_console.terminal.output import TerminalOutput
 
 READ_MOST_BYTES = 4096  # as Textual's driver
 TICK_S = 0.1  # as Textual's driver: an escape key is known by the pause after it
 UNREAD_S = 0.5  # chosen: as long as the first press of a drive key counts
 STOPPING = {one.key for one in Binding.make_bindings(KEYS) if action_of(one) in {"stop_robot", "stop_all"}}
+ENDS_WITHIN_S = 1.0  # chosen: a terminal that reads takes the rest at once
 ESCAPE = "\x1b"
 ASK_POSITION = "\x1b[6n"  # ECMA-48, 8.3.35: device status report; terminals of any age answer
 SEQUENCE = re.compile(r"\x1b[\[O][ -?]*[@-~]?")  # ECMA-48, 5.4: CSI and SS3, whole or its beginning
@@ -60,6 +66,14 @@ class TerminalDriver(LinuxDriver):
     _is_reading = False
     _read_s = math.inf
 
+    def __init__(self, app: App[object], **options: Any) -> None:
+        super().__init__(app, **options)
+        self._output = TerminalOutput(STDERR_FILENO, self._draw_anew)
+
+    def write(self, data: str) -> None:
+        """Write, without waiting for a terminal that does not read."""
+        self._output.write(data)
+
     def start_application_mode(self) -> None:
         """Begin to draw and to read keys.
 
@@ -69,7 +83,19 @@ class TerminalDriver(LinuxDriver):
         if self._is_reading:
             self._must_signal_resume = True
             self.suspend_application_mode()
+        self._output.drops = False
         super().start_application_mode()  # type: ignore[no-untyped-call]  # Textual declares no types here
+        self._output.drops = True
+
+    def stop_application_mode(self) -> None:
+        """Stop drawing and reading, and restore the terminal."""
+        self._output.drops = False
+        super().stop_application_mode()
+
+    def close(self) -> None:
+        """End; give up on a terminal that does not take the rest within ``ENDS_WITHIN_S``."""
+        super().close()
+        self._output.wait_written(ENDS_WITHIN_S)
 
     def ask_position(self) -> None:
         """Ask the terminal for the position of its cursor, unless a multiplexer would answer in its place."""
@@ -83,6 +109,10 @@ class TerminalDriver(LinuxDriver):
             self._read()
         finally:
             self._is_reading = False
+
+    def _draw_anew(self) -> None:
+        with suppress(RuntimeError):  # the event loop has ended
+            self._loop.call_soon_threadsafe(self._app.refresh)
 
     def _read(self) -> None:
         self._read_s = min(self._read_s, time.monotonic())  # after a stop, the last time before it

@@ -48,6 +48,7 @@ def screen_on_a_terminal(program: str, **variables: str) -> Iterator[PlayedTermi
         stdout=its_end,
         stderr=its_end,
         start_new_session=True,
+        close_fds=False,
     ) as screen:
         try:
             yield PlayedTerminal(terminal, screen)

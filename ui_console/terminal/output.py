@@ -1,0 +1,83 @@
+"""Writes a screen to its terminal; a terminal that does not read holds up nothing.
+
+Textual's writer lets the event loop wait for the terminal, and with it the robot, the emergency stop and SIGTERM.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+BEHIND_S = 0.5  # chosen: older pictures help nobody, and a terminal that reads takes them at once
+
+
+class TerminalOutput:
+    """The output of one terminal.
+
+    Law: ``write`` returns at once, in order, and never a part of a text is lost. If the terminal has not taken a text
+    for ``BEHIND_S``, all later ones are dropped until it has taken the earlier ones; then ``caught_up`` is called.
+
+    Args:
+        descriptor: File descriptor of the terminal.
+        caught_up: Called in another thread: the screen has to be drawn anew.
+
+    Attributes:
+        drops: False: no text is dropped, for those that change the terminal's mode.
+    """
+
+    def __init__(self, descriptor: int, caught_up: Callable[[], None]) -> None:
+        self.drops = True
+        self._descriptor, self._caught_up = descriptor, caught_up
+        self._waiting: deque[tuple[float, bytes]] = deque()
+        self._has_dropped = self._is_gone = False
+        self._news = threading.Condition()
+        threading.Thread(target=self._run, name="terminal-output", daemon=True).start()
+
+    def write(self, text: str) -> None:
+        """Write the text as soon as the terminal takes it."""
+        now_s = time.monotonic()
+        with self._news:
+            if self.drops and self._waiting and now_s > self._waiting[0][0] + BEHIND_S:
+                self._has_dropped = True
+            elif not self._is_gone:
+                self._waiting.append((now_s, text.encode(errors="replace")))
+                self._news.notify_all()
+
+    def wait_written(self, within_s: float) -> bool:
+        """Wait until the terminal has taken everything; return False if it did not within this time."""
+        with self._news:
+            return self._news.wait_for(lambda: not self._waiting, within_s)
+
+    def _run(self) -> None:
+        while not self._is_gone:
+            with self._news:
+                self._news.wait_for(lambda: self._waiting)
+                text = self._waiting[0][1]
+            is_gone = not self._taken(text)
+            with self._news:
+                self._is_gone = is_gone
+                if is_gone:
+                    self._waiting.clear()
+                else:
+                    self._waiting.popleft()
+                has_dropped = self._has_dropped and not self._waiting
+                if has_dropped:
+                    self._has_dropped = False
+                self._news.notify_all()
+            if has_dropped:
+                self._caught_up()
+
+    def _taken(self, text: bytes) -> bool:
+        """Wait until the terminal has taken the text; return False if the terminal is gone."""
+        while text:
+            try:
+                text = text[os.write(self._descriptor, text) :]
+            except BlockingIOError:  # whoever had the terminal before left it so
+                select.select([], [self._descriptor], [])
+            except OSError:
+                return False
+        return True
