@@ -14,7 +14,7 @@ import time
 from codecs import getincrementaldecoder
 from collections.abc import Iterable
 from contextlib import suppress
-from pty import STDERR_FILENO
+from pty import STDOUT_FILENO
 from typing import Any
 
 from textual._xterm_parser import XTermParser
@@ -68,7 +68,7 @@ class TerminalDriver(LinuxDriver):
 
     def __init__(self, app: App[object], **options: Any) -> None:
         super().__init__(app, **options)
-        self._output = TerminalOutput(STDERR_FILENO, self._draw_anew)
+        self._output = TerminalOutput(STDOUT_FILENO, self._draw_anew)
 
     def write(self, data: str) -> None:
         """Write, without waiting for a terminal that does not read."""

@@ -9,7 +9,7 @@ import select
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 WITHIN_S = 10.0
@@ -37,16 +37,24 @@ class PlayedTerminal:
 
 
 @contextlib.contextmanager
-def screen_on_a_terminal(program: str, **variables: str) -> Iterator[PlayedTerminal]:
-    """Run the program on a terminal of its own until the block ends, with these variables, outside a multiplexer."""
+def screen_on_a_terminal(
+    program: str, variables: Mapping[str, str] | None = None, *, errors_to: int | None = None
+) -> Iterator[PlayedTerminal]:
+    """Run the program on a terminal of its own until the block ends, outside a multiplexer.
+
+    Args:
+        program: In Python.
+        variables: Of its environment.
+        errors_to: Standard error, if it is not the terminal.
+    """
     terminal, its_end = pty.openpty()
     known = {name: value for name, value in os.environ.items() if name not in {"TMUX", "STY"}}
     with subprocess.Popen(
         [sys.executable, "-c", program],
-        env={**known, "TERM": "xterm-256color", **variables},
+        env={**known, "TERM": "xterm-256color", **(variables or {})},
         stdin=its_end,
         stdout=its_end,
-        stderr=its_end,
+        stderr=its_end if errors_to is None else errors_to,
         start_new_session=True,
         close_fds=False,
     ) as screen:

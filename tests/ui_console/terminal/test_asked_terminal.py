@@ -1,6 +1,8 @@
-"""A terminal is asked whether it is still there, unless a multiplexer would answer in its place."""
+"""A screen is on standard output; its terminal is asked for a sign of life, unless a multiplexer would answer."""
 
 from __future__ import annotations
+
+import subprocess
 
 import pytest
 from screen_on_a_terminal import screen_on_a_terminal
@@ -37,7 +39,12 @@ def test_an_answer_arrives_as_the_place_of_the_cursor() -> None:
 
 @pytest.mark.parametrize("multiplexer", ["TMUX", "STY"])
 def test_a_multiplexer_is_not_asked(multiplexer: str) -> None:
-    with screen_on_a_terminal(PROGRAM, **{multiplexer: "one"}) as played:
+    with screen_on_a_terminal(PROGRAM, {multiplexer: "one"}) as played:
         played.wait_shown(b"BEGUN")
         played.type(b"w")
         assert ASKED not in played.wait_shown(b"NOW-WAITS")
+
+
+def test_a_screen_is_shown_where_standard_output_is() -> None:
+    with screen_on_a_terminal(PROGRAM, errors_to=subprocess.DEVNULL) as played:
+        played.wait_shown(b"BEGUN")

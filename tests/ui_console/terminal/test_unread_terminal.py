@@ -50,7 +50,7 @@ def mark() -> Iterator[tuple[int, int]]:
 
 @pytest.mark.processes
 def test_a_screen_that_nobody_reads_takes_keys_and_ends(mark: tuple[int, int]) -> None:
-    with screen_on_a_terminal(PROGRAM, MARK=str(mark[1])) as played:
+    with screen_on_a_terminal(PROGRAM, {"MARK": str(mark[1])}) as played:
         played.wait_shown(b"BEGUN")
         time.sleep(2 * BEHIND_S)  # in which nobody reads
         played.type(b"w")
@@ -61,7 +61,7 @@ def test_a_screen_that_nobody_reads_takes_keys_and_ends(mark: tuple[int, int]) -
 
 @pytest.mark.processes
 def test_a_terminal_that_reads_again_gets_what_it_missed(mark: tuple[int, int]) -> None:
-    with screen_on_a_terminal(PROGRAM, MARK=str(mark[1])) as played:
+    with screen_on_a_terminal(PROGRAM, {"MARK": str(mark[1])}) as played:
         played.wait_shown(b"BEGUN")
         time.sleep(2 * BEHIND_S)
         played.type(b"w")
