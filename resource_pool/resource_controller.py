@@ -9,6 +9,7 @@ Source: RAM 2002, "Resource Pool"; IROS 2001, section 3.2.
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import logging
 from collections.abc import Mapping
 from functools import partial
@@ -42,13 +43,13 @@ from backbone.scheduling.requests import Holder
 from backbone.waiting import only_bugs
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of
 from resource_pool.commands import OF_THE_BASE, Command
+from resource_pool.driver_adjusting import adjust_all
 from resource_pool.driver_exchange import DriverExchanges
 from resource_pool.driver_slot import DriverSlot
 from resource_pool.drivers.interface import (
     AdjustableDriver,
     DriverSite,
     HardwareFault,
-    NoOptions,
     build_driver,
     options_of_drivers,
 )
@@ -304,7 +305,7 @@ class ResourceController(Component[R], Generic[R]):
 
         Raises:
             NeedsRestart: The running RC cannot change this parameter.
-            WrongParameter: The driver refuses its options.
+            WrongParameter: The driver refuses its options, or fails while it applies them.
         """
         before, now = self._in_force, self.parameters
         changed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)}
@@ -316,10 +317,7 @@ class ResourceController(Component[R], Generic[R]):
             raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed or for_driver))} while it runs")
         if for_driver:
             site = self.driver_site()
-            for driver in drivers:
-                site.options(getattr(driver, "options_type", NoOptions))
-            for driver in drivers:
-                driver.adjust(site)
+            adjust_all(drivers, site, dataclasses.replace(site, parameters=before))
         self._in_force = now
         self.changed()
 

@@ -25,11 +25,14 @@ class PatientGrabber:
     """A driver that can change its rate, but not go faster than it can."""
 
     rates: list[float] = []
+    broken: set[float] = set()
 
     def __init__(self, site: DriverSite) -> None:
         self._site = site
 
     def adjust(self, site: DriverSite) -> None:
+        if site.parameters.frame_rate_hz in self.broken:
+            raise ZeroDivisionError("this driver is broken on purpose")
         if site.parameters.frame_rate_hz > 20:
             raise NeedsRestart("too fast for this grabber")
         self.rates.append(site.parameters.frame_rate_hz)
@@ -149,6 +152,26 @@ def test_the_frame_rate_reaches_a_driver_that_can_take_it_over_and_its_refusal_r
             assert (await parameters(pool, "grabber"))["frame_rate_hz"] == 5.0
             await set_parameter(pool, "grabber", "frame_rate_hz", 6.0)
             assert PatientGrabber.rates == [5.0, 6.0]
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(("broken", "told"), [({7.0}, "on purpose"), ({7.0, 5.0}, "kept a part")])
+def test_a_driver_that_fails_while_it_changes_is_a_refusal_and_the_rc_works_on(
+    local_mission: Any, monkeypatch: pytest.MonkeyPatch, broken: set[float], told: str
+) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            given = {"driver": f"{__name__}:PatientGrabber", "links": {"video_frequency": ["video"]}}
+            await pool.start(Framegrabber, "grabber", given)
+            await set_parameter(pool, "grabber", "frame_rate_hz", 5.0)
+            monkeypatch.setattr(PatientGrabber, "broken", broken)
+            with pytest.raises(WrongParameter, match=told):
+                await set_parameter(pool, "grabber", "frame_rate_hz", 7.0)
+            assert (await parameters(pool, "grabber"))["frame_rate_hz"] == 5.0
+            monkeypatch.setattr(PatientGrabber, "broken", set())
+            await set_parameter(pool, "grabber", "frame_rate_hz", 6.0)
+            assert (await parameters(pool, "grabber"))["frame_rate_hz"] == 6.0
 
     run_virtual(main())
 

@@ -1,0 +1,46 @@
+"""Changed parameters reach all drivers of an RC, or none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from backbone.component.messages import WrongParameter
+from backbone.errors import Refusal, complaint
+from backbone.exchange_course import UNPROVED
+from resource_pool.drivers.interface import AdjustableDriver, DriverSite, NoOptions
+
+
+def adjust_all(drivers: Sequence[AdjustableDriver], site: DriverSite, former: DriverSite) -> None:
+    """Have all drivers apply the parameters of this site.
+
+    Args:
+        drivers: The drivers of one RC.
+        site: With the changed parameters.
+        former: With the parameters in force.
+
+    Raises:
+        Refusal: A driver refuses its options, or cannot apply them; the parameters in force are restored.
+    """
+    for driver in drivers:
+        site.options(getattr(driver, "options_type", NoOptions))
+    for number, driver in enumerate(drivers):
+        try:
+            driver.adjust(site)
+        except UNPROVED as error:
+            for changed in drivers[:number]:
+                changed.adjust(former)
+            if isinstance(error, Refusal):
+                raise
+            kept = "" if _is_back(driver, former) else "; it may have kept a part of the change"
+            raise WrongParameter(
+                f"the driver of {site.resource} failed while it changed: {complaint(error)}{kept}",
+                remedy="Mend the driver's adjust; the component uses the value from its next start on.",
+            ) from error
+
+
+def _is_back(driver: AdjustableDriver, former: DriverSite) -> bool:
+    try:
+        driver.adjust(former)
+    except UNPROVED:
+        return False
+    return True
