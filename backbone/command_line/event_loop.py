@@ -20,6 +20,8 @@ def exit_code_of(work: Callable[[], Awaitable[int]]) -> int:
     async def guarded() -> int:
         return await work()
 
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # asyncio replaces no other, see ``entry``
     try:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             return runner.run(guarded())

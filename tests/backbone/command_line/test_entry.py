@@ -39,10 +39,47 @@ def main(): Faulty()
 sys.modules["ui_console.cli"] = sys.modules["__main__"]
 entry.scout_console()
 """
+WRAPPED = """
+import signal, sys
+from backbone.command_line import entry
+
+def main():
+    try:
+        if "--interrupted" in sys.argv:
+            signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        pass
+    raise ValueError("of a library")
+
+sys.modules["ui_console.cli"] = sys.modules["__main__"]
+entry.scout_console()
+"""
+LOOP = """
+import asyncio, signal, sys
+from backbone.command_line import entry
+from backbone.command_line.event_loop import exit_code_of
+
+async def work():
+    try:
+        signal.raise_signal(signal.SIGINT)
+        await asyncio.sleep(20)
+    except asyncio.CancelledError:
+        print("tidied up")
+        raise
+
+def main():
+    try:
+        exit_code_of(work)
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+sys.modules["ui_console.cli"] = sys.modules["__main__"]
+entry.scout_console()
+"""
 
 
-def ended(code: str, where: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", code]
+def ended(code: str, where: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", code, *words]
     return subprocess.run(command, cwd=where, capture_output=True, text=True, timeout=60, check=False)
 
 
@@ -55,3 +92,14 @@ def test_another_exception_that_python_drops_is_printed(tmp_path: Path) -> None:
     done = ended(OTHER, tmp_path)
     assert (done.returncode, done.stdout) == (0, "")
     assert "OSError: of a destructor" in done.stderr
+
+
+def test_an_interrupt_of_which_a_library_makes_another_exception_ends_the_program(tmp_path: Path) -> None:
+    done = ended(WRAPPED, tmp_path, "--interrupted")
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+    assert "ValueError: of a library" in ended(WRAPPED, tmp_path).stderr
+
+
+def test_an_interrupt_ends_an_event_loop_in_good_order(tmp_path: Path) -> None:
+    done = ended(LOOP, tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "tidied up\n", "")
