@@ -6,6 +6,7 @@ of an unknown escape sequence for keys: shift and the 8 of some keypads would st
 
 from __future__ import annotations
 
+import atexit
 import math
 import os
 import re
@@ -31,7 +32,7 @@ READ_MOST_BYTES = 4096  # as Textual's driver
 TICK_S = 0.1  # as Textual's driver: an escape key is known by the pause after it
 UNREAD_S = 0.5  # chosen: as long as the first press of a drive key counts
 STOPPING = {one.key for one in Binding.make_bindings(KEYS) if action_of(one) in {"stop_robot", "stop_all"}}
-ENDS_WITHIN_S = 1.0  # chosen: a terminal that reads takes the rest at once
+ENDS_WITHIN_S = (0.2, 1.0)  # chosen: while the event loop waits, and at the end of the process
 ESCAPE = "\x1b"
 ASK_POSITION = "\x1b[6n"  # ECMA-48, 8.3.35: device status report; terminals of any age answer
 SEQUENCE = re.compile(r"\x1b[\[O][ -?]*[@-~]?")  # ECMA-48, 5.4: CSI and SS3, whole or its beginning
@@ -69,6 +70,7 @@ class TerminalDriver(LinuxDriver):
     def __init__(self, app: App[object], **options: Any) -> None:
         super().__init__(app, **options)
         self._output = TerminalOutput(STDOUT_FILENO, self._draw_anew)
+        atexit.register(self._output.wait_written, ENDS_WITHIN_S[1])
 
     def write(self, data: str) -> None:
         """Write, without waiting for a terminal that does not read."""
@@ -93,9 +95,9 @@ class TerminalDriver(LinuxDriver):
         super().stop_application_mode()
 
     def close(self) -> None:
-        """End; give up on a terminal that does not take the rest within ``ENDS_WITHIN_S``."""
+        """End; a terminal that does not take the rest soon gets it while the robot is given back."""
         super().close()
-        self._output.wait_written(ENDS_WITHIN_S)
+        self._output.wait_written(ENDS_WITHIN_S[0])
 
     def ask_position(self) -> None:
         """Ask the terminal for the position of its cursor, unless a multiplexer would answer in its place."""

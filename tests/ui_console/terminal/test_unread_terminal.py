@@ -11,6 +11,8 @@ from collections.abc import Iterator
 import pytest
 from screen_on_a_terminal import WITHIN_S, screen_on_a_terminal
 
+from backbone.component.own_tasks import TASKS_END_WITHIN_S
+from ui_console.terminal.driver import ENDS_WITHIN_S
 from ui_console.terminal.output import BEHIND_S, TerminalOutput
 
 PROGRAM = """
@@ -67,6 +69,10 @@ def test_a_terminal_that_reads_again_gets_what_it_missed(mark: tuple[int, int]) 
         played.type(b"w")
         assert os.read(mark[0], 1) == b"1"
         played.wait_shown(b"WRITTEN")
+
+
+def test_the_end_of_a_screen_holds_up_no_end_of_the_console() -> None:
+    assert ENDS_WITHIN_S[0] < TASKS_END_WITHIN_S / 2
 
 
 def test_texts_are_dropped_whole_while_the_reader_is_behind_and_then_it_is_told() -> None:
