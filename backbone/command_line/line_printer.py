@@ -36,7 +36,12 @@ class LinePrinter:
 
     def put(self, line: str) -> None:
         """Print a line as printable text, soon."""
-        said = f"{printable_lines(line, most=sys.maxsize)}\n".encode(sys.stdout.encoding, sys.stdout.errors or "strict")
+        said = printable_lines(line, most=sys.maxsize)
+        self.put_bytes(said.encode(sys.stdout.encoding, sys.stdout.errors or "strict"))
+
+    def put_bytes(self, line: bytes) -> None:
+        """Print a line as it is, soon."""
+        said = line + b"\n"
         if self._put_bytes - self._printed_bytes > MOST_WAITING_BYTES:
             self.dropped += 1
             return

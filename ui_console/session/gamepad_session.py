@@ -18,7 +18,7 @@ from ui_console.model.orders import Order, OrderKind
 from ui_console.model.state_lines import news, state_lines
 from ui_console.model.team import TeamModel
 from ui_console.session.gamepad import Gamepad, NoGamepad, PadWish, Stick, buttons_help, find_gamepad, play_gamepad
-from ui_console.session.joining import end_on_signals, join, write_line
+from ui_console.session.joining import end_on_signals, join, line_writer
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.session.verbs import Session
 
@@ -166,12 +166,13 @@ async def drive_by_gamepad(where: Where, wished: dict[str, object], user: str) -
     joining = await join(where, wished)
     launch = joining.launch
     model = ConsoleModel(launch.name, user, TeamModel(launch.mission, LIFT_REMEDY), sees=False)
-    session = GamepadSession(model, lambda line: write_line(line.encode()))
-    console = Teleoperation(
-        launch, await joining.open_bus(), joining.clock, show=session.show, keeps_arc=True, user=user
-    )
-    interrupted = end_on_signals(console)
-    await session.run(console, gamepad)
+    async with line_writer() as write:
+        session = GamepadSession(model, lambda line: write(line.encode()))
+        console = Teleoperation(
+            launch, await joining.open_bus(), joining.clock, show=session.show, keeps_arc=True, user=user
+        )
+        interrupted = end_on_signals(console)
+        await session.run(console, gamepad)
     if console.refusal is not None and console.given_back is None:
         raise console.refusal
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE

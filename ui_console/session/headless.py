@@ -14,7 +14,7 @@ from ui_console.model.events import ConsoleEvent, for_scripts
 from ui_console.model.script import Step, WrongScript, read_script
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
-from ui_console.session.joining import end_on_signals, join, write_line
+from ui_console.session.joining import end_on_signals, join, line_writer, write_line
 from ui_console.session.observer import Observer, no_person_here
 from ui_console.session.scripted import ScriptDriver, feed_from
 from ui_console.session.teleoperation import Teleoperation
@@ -40,31 +40,33 @@ async def drive_by_script(where: Where, wished: dict[str, object], user: str, sc
         say(f"{script}: {error}")
         return ExitCode.USAGE
     joining = await join(where, wished)
-    driver = ScriptDriver(write_line, steps, within_s=within_s)
-    bus = await joining.open_bus()
-    console = Teleoperation(
-        joining.launch, bus, joining.clock, show=driver.show, work=driver.drive, watches=False, user=user
-    )
-    if script == STANDARD_INPUT:
-        feed_from(sys.stdin.fileno(), driver.feed, driver.cut)
-    interrupted = end_on_signals(console)
-    await console.run()
+    async with line_writer() as write:
+        driver = ScriptDriver(write, steps, within_s=within_s)
+        bus = await joining.open_bus()
+        console = Teleoperation(
+            joining.launch, bus, joining.clock, show=driver.show, work=driver.drive, watches=False, user=user
+        )
+        if script == STANDARD_INPUT:
+            feed_from(sys.stdin.fileno(), driver.feed, driver.cut)
+        interrupted = end_on_signals(console)
+        await console.run()
     return ExitCode.INTERRUPTED if interrupted() else driver.exit_code(console)
 
 
 async def watch_as_json(where: Where, user: str) -> int:
     """Write the events as JSON lines until a signal ends it; return the command's exit code."""
-
-    def show(event: ConsoleEvent) -> None:
-        for line in for_scripts(event):
-            write_line(line)
-
     joining = await join(where)
-    console: Observer[NoParameters] = Observer(
-        joining.launch, await joining.open_bus(), joining.clock, show=show, user=user, answers_of=no_person_here
-    )
-    interrupted = end_on_signals(console)
-    await console.run()
+    async with line_writer() as write:
+
+        def show(event: ConsoleEvent) -> None:
+            for line in for_scripts(event):
+                write(line)
+
+        console: Observer[NoParameters] = Observer(
+            joining.launch, await joining.open_bus(), joining.clock, show=show, user=user, answers_of=no_person_here
+        )
+        interrupted = end_on_signals(console)
+        await console.run()
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
 
 

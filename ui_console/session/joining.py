@@ -8,13 +8,15 @@ import re
 import signal
 import socket
 import sys
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.command_line.line_printer import LinePrinter
 from backbone.command_line.where import Where
 from backbone.component.launch import Launch
 from backbone.launcher.mission_connection import clock_elsewhere
@@ -112,6 +114,20 @@ def _end_on(end: Callable[[str], None], *numbers: signal.Signals) -> Callable[[]
     for number in numbers:
         asyncio.get_running_loop().add_signal_handler(number, caught, number)
     return lambda: signal.SIGINT in came
+
+
+@asynccontextmanager
+async def line_writer() -> AsyncIterator[Callable[[bytes], None]]:
+    """Yield a function that writes one line to standard output, beside the event loop: no reader holds up the robot.
+
+    If the reader has gone away, this process ends in good order, as after SIGTERM.
+    """
+    printer = LinePrinter(lambda: signal.raise_signal(signal.SIGTERM))
+    try:
+        yield printer.put_bytes
+    finally:
+        with suppress(BrokenPipeError):
+            await printer.end()
 
 
 def write_line(line: bytes) -> None:
