@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from typing import IO
+from typing import IO, cast
 
 from rich.console import Console
 from rich.live import Live
@@ -13,6 +13,7 @@ from rich.live import Live
 from backbone.addresses import LAUNCHER, RC_MANAGER
 from backbone.bus import zenoh_threads
 from backbone.bus.interface import Bus, Clock
+from backbone.command_line.terminal_output import TerminalFile, TerminalOutput
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
@@ -41,6 +42,7 @@ EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
 PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start takes less
 REPLY_TIME_S = 2.0  # chosen: the RC manager answers in milliseconds
 SWITCH_S = 0.1  # chosen: the decisions of one switch become one line; a person sees no delay
+ENDS_WITHIN_S = 1.0  # chosen: a terminal that reads takes the last lines at once
 REDRAW_EVERY_S = 0.5  # chosen: slices of seconds stay visible; a faster picture takes a core that the mission needs
 
 
@@ -51,10 +53,18 @@ class ConsoleObserver:
         console: The terminal.
         live: True: a picture that is redrawn; False: lines.
         verdict: Pipe to the command that waits until all is ready; None: no command waits.
+        output: Of the terminal, if it is one.
     """
 
-    def __init__(self, console: Console, *, live: bool, verdict: VerdictPipe | None = None) -> None:
-        self._console, self._live, self._verdict = console, live, verdict
+    def __init__(
+        self,
+        console: Console,
+        *,
+        live: bool,
+        verdict: VerdictPipe | None = None,
+        output: TerminalOutput | None = None,
+    ) -> None:
+        self._console, self._live, self._verdict, self._output = console, live, verdict, output
         self._picture = MissionPicture("")
         self._told = self._health_told = ""
         self._is_up, self._last_progress_s = False, 0.0
@@ -114,10 +124,14 @@ class ConsoleObserver:
     async def _show_live(self, bus: Bus, clock: Clock) -> None:
         console, picture = self._console, self._picture
         with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
-            while True:
-                await look(bus, clock.now_s(), before=picture, rate=clock.rate)
-                live.update(live_screen(picture, picture.log.newest(EVENTS_KEPT), console.height), refresh=True)
-                await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
+            try:
+                while True:
+                    await look(bus, clock.now_s(), before=picture, rate=clock.rate)
+                    live.update(live_screen(picture, picture.log.newest(EVENTS_KEPT), console.height), refresh=True)
+                    await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
+            finally:
+                if self._output is not None:
+                    self._output.drops = False  # the end of the picture restores the terminal
 
     def _heard_health(self, envelope: Envelope[MissionHealth]) -> None:
         heard = printable_all(envelope.body)
@@ -191,8 +205,21 @@ async def bring_up_on_console(
 ) -> int:
     """Run the mission, show it to a person, and return the exit code."""
     zenoh_threads.few_threads()
-    console = Console(file=sys.stdout if live else sys.stderr, markup=False, emoji=False)
-    observer = ConsoleObserver(console, live=live, verdict=verdict)
+    stream, output = sys.stdout if live else sys.stderr, None
+    if stream.isatty():
+        output = TerminalOutput(stream.fileno(), lambda: None, stream.encoding)
+    file = cast("IO[str]", TerminalFile(output)) if output is not None else stream
+    console = Console(file=file, markup=False, emoji=False)
+    try:
+        return await _bring_up(
+            description, options, ConsoleObserver(console, live=live, verdict=verdict, output=output)
+        )
+    finally:
+        if output is not None:
+            output.wait_written(ENDS_WITHIN_S)
+
+
+async def _bring_up(description: MissionDescription, options: UpOptions, observer: ConsoleObserver) -> int:
     observer.tell(f"mission {description.name} comes up")
     try:
         outcome = await run_mission(description, options, observer)

@@ -1,13 +1,16 @@
-"""The terminal of ``up`` is closed: the mission ends in good order, as after SIGTERM, and its recording is whole."""
+"""The terminal of ``up`` is closed or not read: its mission ends in good order, and its recording is whole."""
 
 from __future__ import annotations
 
+import fcntl
 import os
 import pty
 import select
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,3 +67,28 @@ def test_the_mission_goes_down_and_its_recording_is_whole(short_path: Path, tmp_
     assert os.listdir(short_path / "scout-backbone") == []
     with open_file(recording) as file:
         assert Recording(file).contents().messages > 0
+
+
+def test_a_terminal_that_is_not_read_holds_up_no_mission(short_path: Path) -> None:
+    terminal, its_end = pty.openpty()
+    fcntl.ioctl(its_end, termios.TIOCSWINSZ, struct.pack("HHHH", 200, 500, 0, 0))  # one picture is more than it takes
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(short_path), "TERM": "xterm-256color"}
+    with subprocess.Popen(
+        [str(BIN / "scout-backbone"), "up", str(SMALLEST)],
+        env=environment,
+        stdin=its_end,
+        stdout=its_end,
+        stderr=its_end,
+        start_new_session=True,
+    ) as up:
+        try:
+            wait_shown(terminal, LIVE_PICTURE)
+            time.sleep(2.0)  # in which nobody reads
+            down = [str(BIN / "scout-backbone"), "down"]
+            done = subprocess.run(down, env=environment, capture_output=True, text=True, timeout=60, check=False)
+            assert (done.returncode, "asking was enough" in done.stderr) == (0, True), done.stderr
+            assert up.wait(ENDED_WITHIN_S) == 0
+        finally:
+            up.kill()
+            os.close(its_end)
+            os.close(terminal)

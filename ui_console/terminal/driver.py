@@ -25,8 +25,8 @@ from textual.drivers.linux_driver import LinuxDriver
 from textual.events import Key, MouseDown, Paste
 from textual.message import Message
 
+from backbone.command_line.terminal_output import TerminalOutput
 from ui_console.terminal.keys import KEYS, action_of
-from ui_console.terminal.output import TerminalOutput
 
 READ_MOST_BYTES = 4096  # as Textual's driver
 TICK_S = 0.1  # as Textual's driver: an escape key is known by the pause after it

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 import time
 from collections.abc import Iterator
 
 import pytest
 from screen_on_a_terminal import WITHIN_S, screen_on_a_terminal
 
+from backbone.command_line.terminal_output import BEHIND_S
 from backbone.component.own_tasks import TASKS_END_WITHIN_S
 from ui_console.terminal.driver import ENDS_WITHIN_S
-from ui_console.terminal.output import BEHIND_S, TerminalOutput
 
 PROGRAM = """
 import asyncio, os, signal
@@ -73,28 +72,3 @@ def test_a_terminal_that_reads_again_gets_what_it_missed(mark: tuple[int, int]) 
 
 def test_the_end_of_a_screen_holds_up_no_end_of_the_console() -> None:
     assert ENDS_WITHIN_S[0] < TASKS_END_WITHIN_S / 2
-
-
-def test_texts_are_dropped_whole_while_the_reader_is_behind_and_then_it_is_told() -> None:
-    reader, its_end = os.pipe()
-    told = threading.Event()
-    output = TerminalOutput(its_end, told.set)
-    first, last = "a" * 1_000_000, "b"
-    output.write(first)
-    output.write(last)
-    time.sleep(BEHIND_S * 1.1)
-    output.write("dropped")
-    output.drops = False
-    output.write("kept")
-    assert not output.wait_written(0.0)
-    expected = (first + last + "kept").encode()
-    read = b""
-    while len(read) < len(expected):
-        read += os.read(reader, 1 << 16)
-    assert read == expected
-    assert told.wait(WITHIN_S)
-    assert output.wait_written(WITHIN_S)
-    os.close(reader)
-    output.write("to nobody")
-    assert output.wait_written(WITHIN_S)
-    os.close(its_end)

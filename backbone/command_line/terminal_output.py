@@ -1,10 +1,11 @@
 """Writes a screen to its terminal; a terminal that does not read holds up nothing.
 
-Textual's writer lets the event loop wait for the terminal, and with it the robot, the emergency stop and SIGTERM.
+Otherwise the event loop would wait for the terminal, and with it a robot, an emergency stop, a mission and SIGTERM.
 """
 
 from __future__ import annotations
 
+import io
 import os
 import select
 import threading
@@ -24,14 +25,15 @@ class TerminalOutput:
     Args:
         descriptor: File descriptor of the terminal.
         caught_up: Called in another thread: the screen has to be drawn anew.
+        encoding: Of the terminal.
 
     Attributes:
         drops: False: no text is dropped, for those that change the terminal's mode.
     """
 
-    def __init__(self, descriptor: int, caught_up: Callable[[], None]) -> None:
+    def __init__(self, descriptor: int, caught_up: Callable[[], None], encoding: str = "utf-8") -> None:
         self.drops = True
-        self._descriptor, self._caught_up = descriptor, caught_up
+        self._descriptor, self._caught_up, self._encoding = descriptor, caught_up, encoding
         self._waiting: deque[tuple[float, bytes]] = deque()
         self._has_dropped = self._is_gone = False
         self._news = threading.Condition()
@@ -44,7 +46,7 @@ class TerminalOutput:
             if self.drops and self._waiting and now_s > self._waiting[0][0] + BEHIND_S:
                 self._has_dropped = True
             elif not self._is_gone:
-                self._waiting.append((now_s, text.encode(errors="replace")))
+                self._waiting.append((now_s, text.encode(self._encoding, "backslashreplace")))
                 self._news.notify_all()
 
     def wait_written(self, within_s: float) -> bool:
@@ -80,4 +82,21 @@ class TerminalOutput:
                 select.select([], [self._descriptor], [])
             except OSError:
                 return False
+        return True
+
+
+class TerminalFile(io.TextIOBase):
+    """A text file for printing to a terminal by its ``TerminalOutput``."""
+
+    def __init__(self, output: TerminalOutput) -> None:
+        super().__init__()
+        self._output = output
+
+    def write(self, text: str) -> int:
+        """Write the text as soon as the terminal takes it."""
+        self._output.write(text)
+        return len(text)
+
+    def isatty(self) -> bool:
+        """Return True."""
         return True
