@@ -267,7 +267,7 @@ def driver_class(path: str, resource: str, protocol: type = object) -> Callable[
     """Return the class at ``package.module:Class``; imports its file.
 
     Raises:
-        UnknownDriver: There is no such class, or it lacks methods of this protocol.
+        UnknownDriver: There is no such class, or it lacks methods of this protocol, or has async ones instead.
     """
     module_name, _, class_name = path.partition(":")
     try:
@@ -279,7 +279,14 @@ def driver_class(path: str, resource: str, protocol: type = object) -> Callable[
     is_judged = isinstance(found, type) and not hasattr(found, "__getattr__")  # which may pass calls on to another
     if is_judged and (lacking := methods_of(protocol) - methods_of(found)):
         raise UnknownDriver(f"{resource}: {path} lacks {', '.join(sorted(lacking))}")
+    called_at_once = methods_of(protocol) - _waiting_of(protocol) | methods_of(AdjustableDriver)
+    if is_judged and (waiting := sorted(_waiting_of(found) & called_at_once)):
+        raise UnknownDriver(f"{resource}: {path} has async {', '.join(waiting)}, which its RC calls without await")
     return found
+
+
+def _waiting_of(kind: object) -> set[str]:
+    return {name for name in methods_of(kind) if inspect.iscoroutinefunction(getattr(kind, name))}
 
 
 def methods_of(driver: object) -> set[str]:

@@ -53,6 +53,16 @@ class PatientGrabber:
         return Picture(0.0, memoryview(b""), 0, 0)
 
 
+class WaitingGrabber(PatientGrabber):
+    """A driver whose RC would call these methods without effect."""
+
+    async def adjust(self, site: DriverSite) -> None:  # type: ignore[override]
+        super().adjust(site)
+
+    async def stop(self) -> None:  # type: ignore[override]
+        pass
+
+
 async def set_parameter(pool: Pool, rc: str, name: str, value: Any) -> dict[str, Any]:
     at = address(Subsystem.RESOURCE_POOL, rc)
     return (await pool.ear.ask(at, SetParameter(name, value), Parameters, within_s=1)).values
@@ -172,6 +182,16 @@ def test_a_driver_that_fails_while_it_changes_is_a_refusal_and_the_rc_works_on(
             monkeypatch.setattr(PatientGrabber, "broken", set())
             await set_parameter(pool, "grabber", "frame_rate_hz", 6.0)
             assert (await parameters(pool, "grabber"))["frame_rate_hz"] == 6.0
+
+    run_virtual(main())
+
+
+def test_a_driver_that_waits_where_its_rc_does_not_is_refused(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            given = {"driver": f"{__name__}:WaitingGrabber", "links": {"video_frequency": ["video"]}}
+            with pytest.raises(UnknownDriver, match="async adjust, stop"):
+                await pool.start(Framegrabber, "grabber", given)
 
     run_virtual(main())
 
