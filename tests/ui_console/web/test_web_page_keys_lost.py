@@ -16,6 +16,8 @@ TAKERS: dict[str, Callable[[Any], Awaitable[Any]]] = {
     "menu": lambda page: page.locator("#mission").click(button="right"),
     "drag": lambda page: page.evaluate(DRAG),
     "command": lambda page: page.keyboard.down("Meta"),
+    "list": lambda page: page.locator("#theme").click(),
+    "list by a key": lambda page: page.locator("#theme").press("F4"),
 }
 
 

@@ -58,6 +58,9 @@ export class Driving {
       if (event.key === "Meta") this.loseKeys();
     });
     for (const taker of ["contextmenu", "dragstart"]) addEventListener(taker, () => this.loseKeys(), true);
+    for (const opener of /** @type {const} */ (["pointerdown", "keydown"])) {
+      addEventListener(opener, (event) => this.loseKeysTo(event), true);
+    }
     addEventListener("blur", () => this.letGo());
     addEventListener("pagehide", () => this.letGo());
     document.addEventListener("visibilitychange", () => {
@@ -150,6 +153,15 @@ export class Driving {
   /** Let go of held keys: browsers report no release during a menu or a drag, nor, on a Mac, while Command is held. */
   loseKeys() {
     if (this.keys.size > 0) this.letGo();
+  }
+
+  /**
+   * Let go of held keys if the event may open a list of choices, because browsers report no release to an open list.
+   *
+   * @param {PointerEvent | KeyboardEvent} event
+   */
+  loseKeysTo(event) {
+    if (event.target instanceof HTMLSelectElement && !("code" in event && event.code in DRIVES)) this.loseKeys();
   }
 
   followGamepad() {
