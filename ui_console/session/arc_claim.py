@@ -16,6 +16,7 @@ from backbone.bus.interface import Subscription
 from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log.operators import OperatorAction
+from backbone.naming import IllegalName
 from backbone.wire import Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events
@@ -106,7 +107,11 @@ class ArcClaim:
         claim = (wished.kind, wished.claim(console.address))
         self.rests = self.rests and self._last == claim
         if not self.rests:
-            self._arc = ArcClient(console.bus, wished.arc(console.bus), self)
+            try:
+                self._arc = ArcClient(console.bus, wished.arc(console.bus), self)
+            except IllegalName as refusal:  # of a long name and a long kind
+                self._claim_refused(refusal)
+                return
         arc, self._last, self.is_asking = self._arc, claim, True
         assert arc is not None  # noqa: S101  a resting ARC exists
         self._controls.connect(arc)
