@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import msgspec
 
 from backbone.mission_log.question import LogQuestion
-from backbone.ranges import EXACT, LONGEST_LINE, LONGEST_MENTION, Meters, PixelCount
+from backbone.ranges import EXACT, LONGEST_LINE, LONGEST_MENTION, Meters, Name, NameOrNone, PixelCount
 from ui_console.model.consent import MAX_WHY
 from ui_console.model.key_shown import KeyOrder
 from ui_console.model.orders import OrderKind
@@ -26,7 +26,7 @@ GivenValue = Annotated[int, msgspec.Meta(ge=-EXACT, le=EXACT)] | float | bool | 
 KeyText = Annotated[str, msgspec.Meta(max_length=LONGEST_MENTION, pattern=r"^([a-z_]+(/[A-Za-z0-9_.-]+)+)?\Z")]
 """A key of one component without ``scout/<mission>/``, or an address; empty: none."""
 Numbered = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
-Robots = Annotated[list[ShortText], msgspec.Meta(min_length=1, max_length=MOST_ORDERED)]
+Robots = Annotated[list[Name], msgspec.Meta(min_length=1, max_length=MOST_ORDERED)]
 PixelPoint = Annotated[float, msgspec.Meta(ge=-0.5, le=8_192.0)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
@@ -123,8 +123,8 @@ class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
         kind: Kind of ARC; empty: the present kind for the same robot, else a kind that fits the robot.
     """
 
-    robot: ShortText
-    kind: ShortText = ""
+    robot: NameOrNone
+    kind: NameOrNone = ""
 
 
 class MayI(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="may_i"):
