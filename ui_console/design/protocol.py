@@ -10,14 +10,13 @@ from typing import Annotated
 
 import msgspec
 
-from ui_console.web.login import BeatRequest, Hello
+from ui_console.web.login import MAX_MESSAGE_BYTES, BeatRequest, Hello
 
-MOST_TEXT = 1024  # chosen: longer than any value a mission needs; a message is 4096 bytes at most
 MOST_ANSWERS = 16  # chosen: twice the largest number that an element needs
 
 Number = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 PathSaid = Annotated[tuple[Number, ...], msgspec.Meta(max_length=32)]
-Text = Annotated[str, msgspec.Meta(max_length=MOST_TEXT)]
+Text = Annotated[str, msgspec.Meta(max_length=MAX_MESSAGE_BYTES)]
 
 
 class Select(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="select"):
@@ -103,7 +102,7 @@ class SaveFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
     """
 
     revision: int
-    name: Annotated[str, msgspec.Meta(max_length=128)] = ""
+    name: Text = ""
     overwrite: bool = False
 
 

@@ -192,6 +192,15 @@ async def test_the_text_is_shown_as_it_would_be_saved(file: Path) -> None:
         assert anna.answers[0]["text"].encode() == read(file)
 
 
+async def test_a_value_may_be_as_long_as_a_message_and_so_may_a_wrong_name_of_a_file(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna:
+        assert await anna.change(do="set", path=[], name="name", value="x" * 3900) is None
+        assert anna.has_element("x" * 3900)
+        refused = await anna.change(do="save", name="x" * 3900)
+        assert refused is not None
+        assert "is no name of a mission file" in refused["refused"]
+
+
 # ---------------------------------------------------------------------- who is kept out
 @pytest.mark.parametrize(
     ("first", "words"),
@@ -259,11 +268,11 @@ def test_nonsense_is_never_understood_as_anything_else(data: bytes) -> None:
         {"do": "select", "path": [-1]},
         {"do": "select", "path": [0] * 33},
         {"do": "select", "path": ["0"]},
-        {"do": "take", "revision": 1, "path": [], "label": "x" * 1025},
+        {"do": "take", "revision": 1, "path": [], "label": "x" * 4097},
         {"do": "take", "revision": 1, "path": [], "label": "x", "answers": [""] * 17},
         {"do": "set", "revision": 1, "path": [], "name": "a", "value": "b", "more": 1},
         {"do": "save", "revision": "1"},
-        {"do": "save", "revision": 1, "name": "x" * 129},
+        {"do": "save", "revision": 1, "name": "x" * 4097},
         {"do": "undo"},
     ],
 )

@@ -1,5 +1,7 @@
 // Queue of changes to the draft.
 
+import { fits } from "./link.js";
+
 /** @import { DraftChange, MakeChange } from "./design_types.d.ts" */
 
 /**
@@ -57,6 +59,11 @@ export class Changes {
       if (message === undefined) return;
       if (message === null) continue;
       this.underway = { ...message, revision: message.revision ?? revision };
+      if (!fits(this.underway)) {
+        this.refused("This is too long for the page", "Write it into the file.");
+        this.underway = null;
+        continue;
+      }
       if (this.say(this.underway)) return;
       this.refused("NOT CONNECTED: this was not done", "");
       this.drop();

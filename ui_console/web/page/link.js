@@ -13,6 +13,16 @@ const OLD_MS = 800; // chosen: with the checks in between, the warning appears b
 const SILENT_MS = 2000; // chosen: eight beats without return; browsers do not report the loss of a network
 const ANSWER_MS = 10000; // chosen: as long as the server waits for a request and a token
 const NOT_LET_IN = 1008;
+const MOST_BYTES = 4096; // the server's limit
+
+/**
+ * Whether the server reads a message of this length; it cuts off a page that sends a longer one.
+ *
+ * @param {object} message
+ */
+export function fits(message) {
+  return new TextEncoder().encode(JSON.stringify(message)).length <= MOST_BYTES;
+}
 
 /**
  * One connection at a time; `heard` gets objects, `saw` gets pictures, `changed` gets {is, why, ageMs}, where `is` is

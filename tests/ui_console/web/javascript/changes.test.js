@@ -51,6 +51,14 @@ test("without a connection the change is refused, and what waits is forgotten", 
   assert.equal(on.said.length, 1);
 });
 
+test("a change that is longer than the server reads is refused, and the next one goes out", () => {
+  const on = stage();
+  on.changes.add(() => ({ do: "set", path: [], name: "name", value: "ä".repeat(2100), is_parameter: false }));
+  on.changes.add(() => ({ do: "undo" }));
+  assert.equal(on.refusals.length, 1);
+  assert.deepEqual(on.said, [{ revision: 1, do: "undo" }]);
+});
+
 test("before the draft is known nothing is said", () => {
   const on = stage();
   on.revision = undefined;
