@@ -78,6 +78,23 @@ async def test_each_kind_of_field_has_its_control_and_an_arc_without_a_body_has_
         await wheels.assert_still("it has no body that moves")
 
 
+async def test_a_text_that_the_server_would_not_read_is_not_sent_and_the_robot_stays_in_hand(stage: Stage) -> None:
+    able = Abilities(commands=[CommandForm("show_off", FIELDS, roles=["dog"])])
+    stage.know_commands(
+        [ComponentType("capture", "x:Y", Subsystem.RESOURCE_POOL, needs={"dog": "dog"}, abilities=able)]
+    )
+    async with page_at(stage) as page:
+        await take(page)
+        said, show_off = page.get_by_role("textbox", name="said"), page.get_by_role("button", name="Show off")
+        await said.fill("a" * 5000)
+        await show_off.click()
+        await page.get_by_text("TOO LONG: give was not sent.").wait_for()
+        await said.fill("hello")
+        await show_off.click()
+        await wait_until(lambda: [one.values["said"] for one in given(stage)] == ["hello"], "the short one alone")
+        assert len(stage.placer.arcs) == 1
+
+
 async def test_another_kind_of_arc_for_the_robot_in_hand_brings_its_commands(stage: Stage) -> None:
     plain = ComponentType(
         "capture", "x:Y", Subsystem.RESOURCE_POOL, needs=DriveArc.kinds(), abilities=DriveArc.abilities()

@@ -8,7 +8,7 @@ import { find, queryAll } from "./dom.js";
 import { Driving } from "./driving.js";
 import { Hand } from "./hand.js";
 import { Keys } from "./keys.js";
-import { Link } from "./link.js";
+import { fits, Link } from "./link.js";
 import { Log } from "./log.js";
 import { Login } from "./login.js";
 import { RobotMap } from "./map.js";
@@ -242,7 +242,10 @@ function act(what, name = "", more = {}) {
       return;
   }
   if (LET_GO.includes(what)) driving.letGo();
-  if (!say(words[what](name, more))) notice(`NOT CONNECTED: ${what.replace("_", " ")} was not sent.`);
+  const message = words[what](name, more);
+  const unsent = `${what.replace("_", " ")} was not sent.`;
+  if (!fits(message)) notice(`TOO LONG: ${unsent}`);
+  else if (!say(message)) notice(`NOT CONNECTED: ${unsent}`);
 }
 
 /** The robot that a single stop concerns. */
