@@ -5,6 +5,7 @@ import { BusKeys } from "./bus.js";
 import { Cards } from "./cards.js";
 import { Commands } from "./commands.js";
 import { find, queryAll } from "./dom.js";
+import { Confirmations } from "./drawn.js";
 import { Driving } from "./driving.js";
 import { Hand } from "./hand.js";
 import { Keys } from "./keys.js";
@@ -31,8 +32,9 @@ const view = {};
 
 /** @type {Link<Heard, Said>} */
 const link = new Link({ heard, saw, changed });
+const confirmations = new Confirmations((message) => link.say(message));
 /** @type {Say} */
-const say = (message) => link.say(message);
+const say = (message) => (message.do === "drawn" ? confirmations.add(message) : link.say(message));
 const cards = new Cards({ stage: find("stage"), thumbs: find("thumbs"), say, act });
 const seen = new Seen({
   panel: find("seen-panel", HTMLDetailsElement),
