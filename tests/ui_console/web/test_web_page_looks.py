@@ -48,6 +48,15 @@ async def test_while_a_robot_is_driven_its_stop_and_that_of_all_are_in_sight_and
         await wait_stopped(page)
 
 
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_long_words_of_people_push_no_button_off_the_screen(stage: Stage, size: str) -> None:
+    async with page_at(stage, size) as page:
+        await take(page)
+        stage.robots["scout1"].stop("n" * 63, "console", f"see {'w' * 63}")
+        await page.locator("#own", has_text="wwww").wait_for()
+        await assert_no_sideways_scroll(page)
+
+
 async def test_without_a_robot_the_one_that_was_chosen_is_large(stage: Stage) -> None:
     async with page_at(stage) as page:
         await page.wait_for_selector(".robot.is-large[data-robot=scout1]")
