@@ -98,6 +98,7 @@ function changed({ is, why }) {
   wasDown = true;
   changes.drop();
   if (is === "refused") {
+    view.status = undefined; // nothing here keeps a person from loading the page again
     find("designer").hidden = true;
     login.ask(why);
   }

@@ -14,7 +14,8 @@ export class Login {
     this.user = find("login-user", HTMLInputElement);
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.try(this.token.value.trim(), this.user.value.trim());
+      remember(this.token.value.trim(), this.user.value.trim());
+      location.reload(); // what the page shows may be of another mission
     });
   }
 
@@ -47,9 +48,16 @@ export class Login {
    * @param {string} user
    */
   try(token, user) {
-    sessionStorage.setItem(remembered("token"), token);
-    sessionStorage.setItem(remembered("user"), user);
     this.form.hidden = true;
     this.enter({ token, user });
   }
+}
+
+/**
+ * @param {string} token
+ * @param {string} user
+ */
+function remember(token, user) {
+  sessionStorage.setItem(remembered("token"), token);
+  sessionStorage.setItem(remembered("user"), user);
 }
