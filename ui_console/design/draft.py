@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bisect
 import contextlib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -63,7 +64,7 @@ class Draft:
             MissionInvalid: The file cannot be read, or is not XML.
         """
         with contextlib.suppress(OSError):  # the file can be opened nevertheless
-            remove_leftover(FilePath(source).resolve())
+            remove_leftover(FilePath(os.path.realpath(source)))  # ``resolve`` raises on a loop of links
         report = Report(source)
         text = read_bytes(FilePath(source), report)
         if text is None:

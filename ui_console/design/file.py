@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from backbone.atomic_file import replace_file
@@ -40,7 +41,7 @@ def save(draft: Draft, path: Path, *, overwrite: bool = False) -> Draft:
         NotSaved: The system refused.
     """
     try:
-        target = path.resolve()
+        target = Path(os.path.realpath(path))  # ``resolve`` raises on a loop of links
         holds = target.read_bytes() if target.exists() else None
         known = draft.saved if path == Path(draft.source) else None
         if not overwrite and holds is not None and holds not in (known, draft.text):

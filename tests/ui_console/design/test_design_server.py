@@ -31,6 +31,11 @@ def write(file: Path, text: bytes) -> None:
     file.write_bytes(text)
 
 
+def link_to_itself(file: Path) -> None:
+    file.unlink()
+    file.symlink_to(file)
+
+
 def names(folder: Path) -> set[str]:
     return {one.name for one in folder.iterdir()}
 
@@ -136,6 +141,16 @@ async def test_what_somebody_else_wrote_is_kept_until_it_is_told_to_overwrite(fi
         assert "not well-formed XML" in answer["refused"]
         await anna.change(do="save", overwrite=True)
     assert read(file) == theirs
+
+
+async def test_a_file_that_has_become_a_loop_of_links_is_refused_and_saved_over(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna:
+        link_to_itself(file)
+        answer = await anna.change(do="reread")
+        assert answer is not None
+        assert "Too many levels of symbolic links" in answer["refused"]
+        await anna.change(do="save")
+    assert read(file) == MISSION_XML
 
 
 async def test_an_unsaved_design_outlives_the_server_and_its_connections(file: Path) -> None:
