@@ -8,6 +8,7 @@ import { set } from "./text.js";
 /** @typedef {string | number | boolean} Value Of a field. */
 
 const UNLIMITED = 1e18; // the limit of all numbers on the bus
+const EXACT = 2 ** 53; // the server reads no larger whole number
 const STEPS = 100; // chosen: a slider is not finer than a finger
 
 /**
@@ -178,11 +179,11 @@ function inputOf(field, kind) {
   const first = firstOf(field);
   input.type = { switch: "checkbox", slider: "range", number: "number" }[kind] ?? "text";
   input.required = field.is_required && kind !== "switch";
-  if (kind === "slider") {
-    input.min = String(field.least);
-    input.max = String(field.most);
+  if (kind === "slider" || kind === "number") {
+    input.min = String(Math.max(field.least, -EXACT));
+    input.max = String(Math.min(field.most, EXACT));
+    input.step = stepOf(field);
   }
-  if (kind === "slider" || kind === "number") input.step = stepOf(field);
   if (kind === "switch") {
     input.setAttribute("role", "switch");
     input.checked = first === true;
