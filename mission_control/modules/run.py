@@ -29,6 +29,7 @@ def connected(
 
     Raises:
         GraphRefused: They cannot be connected; it says everything at once.
+        ValueError: The frequency is not between 0 and 1000 Hz.
     """
     members = [Member(default_name(type(module)), module.ports()) for module in modules]
     by_name = {member.name: module for member, module in zip(members, modules, strict=True)}
@@ -51,6 +52,7 @@ def run(
 
     Raises:
         GraphRefused: They cannot be connected; it says everything at once.
+        ValueError: The frequency is not between 0 and 1000 Hz.
         NothingToHear: No module produces a key of ``listen``.
     """
     clock = MissionClock.started_now()

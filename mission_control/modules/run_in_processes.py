@@ -87,6 +87,7 @@ def run_in_processes(
     Raises:
         GraphRefused: The modules cannot be connected, or exchange values that are not messages; the error lists all
             faults.
+        ValueError: The frequency is not between 0 and 1000 Hz.
         NothingToHear: No module produces a key of ``listen``, or its values are no messages.
         ModuleProcessFell: A process ended before the time was over.
     """

@@ -42,6 +42,8 @@ class Trigger(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     on_input: OnInput = OnInput.ANY
 
     def __post_init__(self) -> None:
+        if not 0 <= self.frequency_hz <= MOST_HZ:  # msgspec compares with the range only what it decodes
+            raise ValueError(f"a frequency of {self.frequency_hz} Hz; give one from 0 to {MOST_HZ:g}")
         if self.frequency_hz == 0 and self.on_input is OnInput.NONE:
             raise ValueError("a unit without a frequency that runs on no input never runs; give it one of them")
 

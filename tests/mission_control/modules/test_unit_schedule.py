@@ -93,3 +93,10 @@ def test_a_unit_that_could_never_run_is_refused() -> None:
         Trigger(0.0, OnInput.NONE)
     with pytest.raises(msgspec.ValidationError, match="never runs"):
         msgspec.convert({"on_input": "none"}, Trigger)
+
+
+@pytest.mark.parametrize("frequency_hz", [-1.0, math.nan, math.inf, 2 * MOST_HZ])
+def test_a_frequency_without_a_grid_is_refused_wherever_it_comes_from(frequency_hz: float) -> None:
+    """A script gives it to ``run``, and nothing decodes it: -1 Hz never ended, and with nan no round began."""
+    with pytest.raises(ValueError, match=f"a frequency of {frequency_hz} Hz; give one from 0 to 1000"):
+        Trigger(frequency_hz)
