@@ -16,7 +16,7 @@ from backbone.errors import Refusal
 from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, write
 from mission_control.modules.graph import Graph, GraphRefused, Member, WiringFault
 from mission_control.modules.module import Module
-from mission_control.modules.orders import WrongModule
+from mission_control.modules.orders import WrongModule, is_message
 from mission_control.modules.ports import Port, kinds_of_ports, type_name
 
 
@@ -119,7 +119,9 @@ def judge_of(kinds: Mapping[str, object], kind: type[Module], member: Member) ->
 
 
 def _is_of(value: object, kind: object) -> bool:
-    """Return whether the value is of the class, as far as this can be checked."""
+    """Return whether the value is of the class, as far as this can be checked; other processes read no subclass."""
+    if is_message(kind):
+        return type(value) is kind
     if get_origin(kind) is not None or not isinstance(kind, type):
         return True
     return isinstance(value, (float, int) if kind is float else kind)

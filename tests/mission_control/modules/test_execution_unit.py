@@ -199,6 +199,10 @@ def test_a_class_of_ports_is_read_once() -> None:
     assert ports_of(Pair.Inputs) is ports_of(Pair.Inputs)
 
 
+class Rounded(Number, frozen=True):
+    """A message of its own on the bus, which a reader of ``Number`` refuses."""
+
+
 class Faulty(Module):
     """Returns what it is given, or raises it."""
 
@@ -222,6 +226,7 @@ class Faulty(Module):
         ({"number": Number(1.0)}, "not its Outputs"),
         (Faulty.Outputs("text"), "update of faulty returned builtins:str as number, not"),  # type: ignore[arg-type]
         (Faulty.Outputs(Trigger(1.0)), "Trigger as number, not"),  # type: ignore[arg-type]
+        (Faulty.Outputs(Rounded(1.0)), "Rounded as number, not sample_modules:Number"),
         (asyncio.CancelledError(), "update of faulty raised CancelledError"),
         (StopIteration(), r"update of faulty raised StopIteration: \(.*test_execution_unit.py, line"),
     ],
