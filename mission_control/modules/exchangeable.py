@@ -101,14 +101,19 @@ def judge_of(kinds: Mapping[str, object], kind: type[Module], member: Member) ->
     Args:
         kinds: Key → class of its values, as declared by the modules that take them.
     """
-    wanted = [(port.name, key, kinds[key]) for key, port in member.keyed_outputs]
+    wanted = [(port, key, kinds[key]) for key, port in member.keyed_outputs]
 
     def judge(outputs: object) -> None:
         if not isinstance(outputs, kind.Outputs):
             told = f"update of {member.name} returned {type_name(type(outputs))}, not its Outputs"
             raise WrongModule(told, remedy="Return them.")
-        for name, key, of in wanted:
-            value = getattr(outputs, name)
+        for port, key, of in wanted:
+            value = getattr(outputs, port.name)
+            if value is None and port.is_required:
+                raise WrongModule(
+                    f"update of {member.name} returned None as {key}, which each round must have",
+                    remedy="Give an output that may be left out the default None: 'name: Class | None = None'.",
+                )
             if value is not None and not _is_of(value, of):
                 raise WrongModule(
                     f"update of {member.name} returned {type_name(type(value))} as {key}, not {type_name(of)}",

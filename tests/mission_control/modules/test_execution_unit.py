@@ -227,6 +227,7 @@ class Faulty(Module):
         (Faulty.Outputs("text"), "update of faulty returned builtins:str as number, not"),  # type: ignore[arg-type]
         (Faulty.Outputs(Trigger(1.0)), "Trigger as number, not"),  # type: ignore[arg-type]
         (Faulty.Outputs(Rounded(1.0)), "Rounded as number, not sample_modules:Number"),
+        (Faulty.Outputs(None), "update of faulty returned None as number, which each round must have"),  # type: ignore[arg-type]
         (asyncio.CancelledError(), "update of faulty raised CancelledError"),
         (StopIteration(), r"update of faulty raised StopIteration: \(.*test_execution_unit.py, line"),
     ],

@@ -255,7 +255,7 @@ def test_a_class_that_cannot_be_made_is_refused_and_nothing_changes(
         ("import sys; sys.exit(3)", "SystemExit: 3"),
         ("raise KeyboardInterrupt", "KeyboardInterrupt"),
         (r"raise ValueError('no model caf\udce9')", r"no model caf\udce9"),
-        ("return self.Outputs(None)", "not ready within"),
+        ("return self.Outputs(None)", "returned None as count"),
         ("return self.Outputs(Count('one', 'second'))", "count, which cannot be sent: Count/1: Expected `int`"),
         ("return self.Outputs(Count(1, {1}.pop))", "count, which cannot be sent: Encoding objects"),
         (r"return self.Outputs(Count(1, '\udce9'))", "count, which cannot be sent: Count has a text that is not UTF-8"),
