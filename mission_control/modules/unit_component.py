@@ -21,6 +21,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import WrongParameter
 from backbone.debug_views import ListViews, LookAt
+from backbone.errors import Refusal
 from backbone.exchange import SwapModule
 from backbone.keys import Conversation
 from backbone.mission.arranged import Arranged, UnitsQuestion
@@ -43,6 +44,7 @@ if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
     from numpy.typing import NDArray
 
 _TABLES = ("overwritten", "modules")  # suffixes in the statistics, so that each entry has its own name
+UNSENDABLE = "Return fields of the declared types, and memory without gaps."
 REPORT_EVERY_S = 1.0  # chosen: a person reads no faster; seconds of the mission
 
 
@@ -200,7 +202,12 @@ class UnitComponent(Component[UnitParameters]):
         for key, value in produced:
             if key in self._published:
                 assert isinstance(value, Message)  # noqa: S101  its class was checked at the start
-                self.bus.publish(output_address(self.address, key), Conversation.OUTPUTS, value)
+                try:
+                    self.bus.publish(output_address(self.address, key), Conversation.OUTPUTS, value)
+                except (Refusal, TypeError, BufferError) as error:  # a field of another class; memory with gaps
+                    cause, remedy = (error.detail, error.remedy) if isinstance(error, Refusal) else (error, UNSENDABLE)
+                    told = f"{key}, a {type(value).__name__}, cannot be sent: {cause}"
+                    raise WrongModule(told, remedy=remedy) from error
         if now_s >= self._report_again_s:
             self._report_misses(now_s)
 

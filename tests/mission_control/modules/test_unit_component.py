@@ -31,7 +31,7 @@ from backbone.debug_views import ListViews, Views
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.quality import QUALITY, OutputQuality, Urgency
-from backbone.wire import Message
+from backbone.wire import WIRE_VERSION, Envelope, Message, write
 from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
 from mission_control.modules.execution_unit import NeverRuns
 from mission_control.modules.graph import GraphRefused
@@ -321,5 +321,58 @@ def test_what_a_unit_cannot_run_is_refused_with_the_reason(
         await asyncio.sleep(0)
         with pytest.raises(refusal, match=says):
             unit_on(LocalNetwork(), "one", parameters)
+
+    run_virtual(main())
+
+
+class Gap(Message, frozen=True):
+    data: Any
+
+
+class SendsWhatItIsGiven(Module):
+    class Outputs(Module.Outputs):
+        gap: Gap
+
+    class Parameters(Module.Parameters, frozen=True):
+        of: str
+
+    parameters: Parameters
+
+    def update(self, inputs: Module.Inputs) -> Outputs:
+        return self.Outputs(Gap(UNSENDABLE[self.parameters.of]))
+
+
+UNSENDABLE: dict[str, Any] = {
+    "number": 1j,
+    "memory": memoryview(bytes(8))[::2],
+    "text": "\udc80",
+    "length": bytes(2**26 + 1),
+}
+
+
+@pytest.mark.parametrize(
+    ("of", "says"),
+    [
+        ("number", "gap, a Gap, cannot be sent: Encoding objects of type complex"),
+        ("memory", "gap, a Gap, cannot be sent: memoryview: underlying buffer is not C-contiguous"),
+        ("text", "gap, a Gap, cannot be sent: Gap has a text"),
+        ("length", "gap, a Gap, cannot be sent: Gap of 67108"),
+    ],
+)
+def test_an_output_that_cannot_be_sent_is_named(
+    local_mission: Any, monkeypatch: pytest.MonkeyPatch, of: str, says: str
+) -> None:
+    """The local bus hands objects over; here it writes them, as the bus between processes does."""
+    order = ModuleOrder("sender", f"{__name__}:SendsWhatItIsGiven", {"of": of})
+
+    def written(address: str, conversation: Conversation, message: Message) -> None:
+        write(Envelope(WIRE_VERSION, TESTER, 1, 0.0, "", message))
+
+    async def main() -> None:
+        async with local_mission() as network:
+            sender = unit_on(network, "one", unit(order, published=["gap"]))
+            monkeypatch.setattr(sender.bus, "publish", written)
+            with pytest.raises(WrongModule, match=says):
+                await sender.run()
 
     run_virtual(main())
