@@ -23,7 +23,7 @@ import msgspec
 
 from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
-from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, Statistics
 from backbone.errors import Refusal
@@ -82,7 +82,8 @@ def run_in_processes(
             class and parameters.
         frequency_hz: Rounds a second, above 0.
         for_s: Seconds; left out: until the process is interrupted.
-        listen: Key → function that is called in this process with each of its values.
+        listen: Key → function that is called in this process with each of its values; values over 8 MB reach modules
+            only.
 
     Raises:
         GraphRefused: The modules cannot be connected, or exchange values that are not messages; the error lists all
@@ -99,7 +100,7 @@ def run_in_processes(
     with tempfile.TemporaryDirectory(prefix="scout-") as folder, ExitStack() as stack:
         children: list[_Child] = []
         for name, parameters in units.items():
-            children.append(_forked(name, parameters, clock, children))
+            children.append(_forked(name, parameters, clock, folder, children))
             stack.callback(_end, children[-1])
         return asyncio.run(_accompany(children, socket_endpoint(Path(folder)), clock, for_s, listen or {}))
 
@@ -126,11 +127,14 @@ def _order(name: str, module: Module) -> ModuleOrder:
 
 
 # ---------------------------------------------------------------------- in the script
-def _forked(name: str, parameters: UnitParameters, clock: MissionClock, others: Sequence[_Child]) -> _Child:
+def _forked(
+    name: str, parameters: UnitParameters, clock: MissionClock, folder: str, others: Sequence[_Child]
+) -> _Child:
     """Fork a process that waits for the hub's endpoint; call this before the hub's threads exist."""
     given = msgspec.to_builtins(parameters)
     origin_s = clock.origin_monotonic_s
-    launch = Launch(MISSION, Subsystem.MISSION_CONTROL, name, "unit", "", "here", "", origin_s, 1.0, given)
+    about = (MISSION, Subsystem.MISSION_CONTROL, name, "unit", "", "here", "")
+    launch = Launch(*about, origin_s, 1.0, given, run_directory=folder)
     fork = multiprocessing.get_context("fork")
     ours, theirs = fork.Pipe()
     inherited = [ours, *(other.connection for other in others)]
@@ -219,7 +223,6 @@ def _become(launch: Launch, connection: Connection, inherited: Sequence[Connecti
 
 async def _live(launch: Launch, connection: Connection) -> None:
     clock = MissionClock(launch.clock_origin_monotonic_s)
-    bus = await ZenohBus.open_when_up(MISSION, launch.address, clock, client_config(launch.endpoint))
-    unit = _Unit(launch, bus, clock)
+    unit = _Unit(launch, _Unit.open_bus(launch, clock), clock)
     asyncio.get_running_loop().add_reader(connection.fileno(), unit.end, "its script has ended")
     await unit.run()

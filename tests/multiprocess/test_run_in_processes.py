@@ -98,3 +98,41 @@ def test_what_cannot_be_connected_starts_no_process(monkeypatch: pytest.MonkeyPa
 
     with pytest.raises(GraphRefused, match="smoothing needs wave"):
         run_in_processes(pair.Smoothing())
+
+
+LARGE = """
+from backbone.ranges import Bulk
+from backbone.wire import Message
+from mission_control.modules.module import Module
+from mission_control.modules.run_in_processes import run_in_processes
+
+class Map(Message, frozen=True):
+    cells: Bulk
+
+class Length(Message, frozen=True):
+    of: int
+
+class Mapper(Module):
+    class Outputs(Module.Outputs):
+        map: Map
+    def update(self, inputs):
+        return self.Outputs(Map(memoryview(bytes(20_000_000))))
+
+class Measure(Module):
+    class Inputs(Module.Inputs):
+        map: Map
+    class Outputs(Module.Outputs):
+        length: Length
+    def update(self, inputs):
+        return self.Outputs(Length(len(inputs.map.cells)))
+
+lengths = set()
+run_in_processes(Mapper(), Measure(), frequency_hz=2, for_s=3, listen={"length": lambda one: lengths.add(one.of)})
+print(lengths)
+"""
+
+
+def test_a_value_that_the_network_would_not_take_reaches_the_next_process_as_in_a_mission() -> None:
+    words = [sys.executable, "-c", LARGE]
+    done = subprocess.run(words, check=True, capture_output=True, text=True, cwd=TOP, timeout=WITHIN_S)
+    assert done.stdout == "{20000000}\n", done.stderr
