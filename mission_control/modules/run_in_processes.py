@@ -11,6 +11,7 @@ import math
 import multiprocessing
 import signal
 import tempfile
+import threading
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -45,6 +46,17 @@ END_WITHIN_S = 2.0  # chosen: a unit ends in milliseconds, unless a module compu
 ANSWERS_WITHIN_S = 2.0  # chosen: a unit answers in a millisecond, unless a module computes
 
 
+_has_run = threading.Event()
+"""Set when this process has opened a bus: the processes that it forks afterwards cannot open one (decision 0003)."""
+
+
+class RunsOnce(Refusal):
+    """This process has run modules in processes before, and cannot fork further ones that work."""
+
+    code = "module.once"
+    remedy = "Run each in a script of its own, or call 'run', which needs no processes."
+
+
 class ModuleProcessFell(Refusal):
     """The process of a module ended, or was not ready in time."""
 
@@ -75,7 +87,8 @@ def run_in_processes(
 ) -> dict[str, dict[str, float]]:
     """Run each module in its own process; when the time is over, return module → statistics of its unit.
 
-    A module that waits for inputs runs when they arrive; the other modules run at the frequency.
+    A script can call it once. A module that waits for inputs runs when they arrive; the other modules run at the
+    frequency.
 
     Args:
         modules: Modules of different classes, each at the top level of a file. The processes create them again from
@@ -91,11 +104,14 @@ def run_in_processes(
         ValueError: The frequency is not between 0 and 1000 Hz.
         NothingToHear: No module produces a key of ``listen``, or its values are no messages.
         ModuleProcessFell: A process ended before the time was over.
+        RunsOnce: The script has called it before.
     """
     units = _units(modules, frequency_hz)
     published = {key for one in units.values() for key in one.published}
     for key in listen or {}:
         check_heard(key, published)
+    if _has_run.is_set():
+        raise RunsOnce("a script can run modules in processes once")
     clock = MissionClock.started_now()
     with tempfile.TemporaryDirectory(prefix="scout-") as folder, ExitStack() as stack:
         children: list[_Child] = []
@@ -159,6 +175,7 @@ async def _accompany(
     fell: asyncio.Future[str] = loop.create_future()
     for child in children:
         loop.add_reader(child.process.sentinel, settle, fell, child.process.name)
+    _has_run.set()
     hub = ZenohBus.open(MISSION, "ui_console/script", clock, hub_config([endpoint]))
     try:
         for child in children:

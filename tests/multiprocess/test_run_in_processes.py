@@ -136,3 +136,23 @@ def test_a_value_that_the_network_would_not_take_reaches_the_next_process_as_in_
     words = [sys.executable, "-c", LARGE]
     done = subprocess.run(words, check=True, capture_output=True, text=True, cwd=TOP, timeout=WITHIN_S)
     assert done.stdout == "{20000000}\n", done.stderr
+
+
+AGAIN = """
+from pair import Smoothing, Wave
+from mission_control.modules.run_in_processes import RunsOnce, run_in_processes
+
+run_in_processes(Wave(), Smoothing(), for_s=0.1)
+try:
+    run_in_processes(Wave(), Smoothing(), for_s=0.1)
+except RunsOnce as refused:
+    print(refused)
+"""
+
+
+def test_a_second_run_in_one_script_is_refused_at_once() -> None:
+    """Zenoh works in no process that is forked after its threads exist; the second run waited for 20 s in vain."""
+    words = [sys.executable, "-c", AGAIN]
+    environment = {"PYTHONPATH": str(EXAMPLES)}
+    done = subprocess.run(words, check=True, env=environment, capture_output=True, text=True, cwd=TOP, timeout=WITHIN_S)
+    assert done.stdout.startswith("a script can run modules in processes once (Run each in a script of its own")
