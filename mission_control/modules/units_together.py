@@ -28,6 +28,13 @@ class NothingToHear(Refusal):
     remedy = "Name the key of an output."
 
 
+class NotGiven(Refusal):
+    """A value of a key that does not come from outside would reach no module."""
+
+    code = "module.feed"
+    remedy = "Feed a key of 'given'."
+
+
 def check_heard(key: str, produced: Collection[str]) -> None:
     """Return if values of this key are produced.
 
@@ -63,6 +70,7 @@ class UnitsTogether:
             for name in graph.units
         }
         members = [member for of in graph.units.values() for member in of]
+        self._given = graph.given
         self._produced = {key for member in members for key, _port in member.keyed_outputs}
         self._consumers: dict[str, list[ExecutionUnit]] = defaultdict(list)
         for one in graph.connections:
@@ -84,7 +92,13 @@ class UnitsTogether:
         self._listeners[key].append(listener)
 
     def feed(self, key: str, value: object, now_s: float) -> None:
-        """Store a value from outside, and run every unit that is due because of it."""
+        """Store a value from outside, and run every unit that is due because of it.
+
+        Raises:
+            NotGiven: The graph names no such key as given.
+        """
+        if key not in self._given:
+            raise NotGiven(f"{key!r} is not given from outside{did_you_mean(key, self._given)}")
         self._run([unit for unit in self._consumers[key] if unit.put(key, value)], now_s)
 
     def tick(self, now_s: float) -> None:

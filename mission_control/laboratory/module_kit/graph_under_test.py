@@ -40,7 +40,11 @@ class GraphUnderTest:
             self._units.listen(key, values.append)
 
     def feed(self, key: str, value: object) -> None:
-        """Feed a value from outside, and run every module that is due because of it."""
+        """Feed a value from outside, and run every module that is due because of it.
+
+        Raises:
+            NotGiven: The key is none of ``given``, so no module would get the value.
+        """
         self._units.feed(key, value, self.now_s)
 
     def advance(self, for_s: float) -> None:

@@ -18,7 +18,7 @@ from mission_control.modules.graph import GraphRefused, NoProducer
 from mission_control.modules.ports import type_name
 from mission_control.modules.run import UNIT, connected, run, run_units
 from mission_control.modules.run_in_processes import run_in_processes
-from mission_control.modules.units_together import NothingToHear
+from mission_control.modules.units_together import NotGiven, NothingToHear
 
 TOP = Path(__file__).parents[3]
 PAIR, GUIDE = TOP / "docs/examples/pair.py", TOP / "docs/how-to/write-a-module.md"
@@ -45,6 +45,14 @@ def test_without_a_frequency_they_run_on_what_is_fed() -> None:
     units.listen("twice", seen.append)
     units.feed("number", Number(4.0), 0.0)
     assert seen == [Number(8.0)]
+
+
+@pytest.mark.parametrize("key", ["nummber", "twice"])
+def test_a_value_that_would_reach_no_module_is_refused(key: str) -> None:
+    """With a key in error, a test of what a module does *not* produce passed."""
+    units = connected(Doubler(), given={"number": type_name(Number)})
+    with pytest.raises(NotGiven, match=f"'{key}' is not given from outside"):
+        units.feed(key, Number(4.0), 0.0)
 
 
 def test_what_cannot_be_connected_is_refused_before_anything_runs() -> None:
