@@ -10,10 +10,24 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module, default_name
+from mission_control.modules.orders import WrongModule
 from mission_control.modules.unit_schedule import Trigger
 from mission_control.modules.units_together import Listener, UnitsTogether
 
+LONGEST_SHOWN = 100  # chosen: a class with its package
 UNIT = "unit"  # the name of the only unit
+
+
+def member_of(module: Module) -> Member:
+    """Return a module's place in a graph, under the name of its class.
+
+    Raises:
+        WrongModule: It is no module, for example a class in place of its instance.
+    """
+    given: object = module  # a script has no types
+    if not isinstance(given, Module):
+        raise WrongModule(f"{given!r:.{LONGEST_SHOWN}} is no module", remedy="Give an instance, such as 'Wave()'.")
+    return Member(default_name(type(module)), module.ports())
 
 
 def connected(
@@ -29,9 +43,10 @@ def connected(
 
     Raises:
         GraphRefused: They cannot be connected; it says everything at once.
+        WrongModule: One of them is no module.
         ValueError: The frequency is not between 0 and 1000 Hz.
     """
-    members = [Member(default_name(type(module)), module.ports()) for module in modules]
+    members = [member_of(module) for module in modules]
     by_name = {member.name: module for member, module in zip(members, modules, strict=True)}
     return UnitsTogether(Graph({UNIT: members}, given), by_name, {UNIT: Trigger(frequency_hz)}, start_s)
 
@@ -52,6 +67,7 @@ def run(
 
     Raises:
         GraphRefused: They cannot be connected; it says everything at once.
+        WrongModule: One of them is no module.
         ValueError: The frequency is not between 0 and 1000 Hz.
         NothingToHear: No module produces a key of ``listen``.
     """

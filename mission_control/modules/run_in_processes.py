@@ -33,10 +33,11 @@ from backbone.naming import Subsystem
 from backbone.waiting import settle
 from backbone.wire import Envelope, Message
 from mission_control.modules.arrangement import UnitOrder, arranged
-from mission_control.modules.graph import Graph, Member
-from mission_control.modules.module import Module, default_name
+from mission_control.modules.graph import Graph
+from mission_control.modules.module import Module
 from mission_control.modules.orders import ModuleOrder, UnitParameters, is_message, output_address
 from mission_control.modules.ports import kinds_of_ports
+from mission_control.modules.run import member_of
 from mission_control.modules.unit_component import UnitComponent
 from mission_control.modules.units_together import Listener, check_heard
 
@@ -101,6 +102,7 @@ def run_in_processes(
     Raises:
         GraphRefused: The modules cannot be connected, or exchange values that are not messages; the error lists all
             faults.
+        WrongModule: One of them is no module.
         ValueError: The frequency is not between 0 and 1000 Hz.
         NothingToHear: No module produces a key of ``listen``, or its values are no messages.
         ModuleProcessFell: A process ended before the time was over.
@@ -123,7 +125,7 @@ def run_in_processes(
 
 def _units(modules: Sequence[Module], frequency_hz: float) -> dict[str, UnitParameters]:
     """Return unit → parameters; consumers are before their producers."""
-    members = [Member(default_name(type(one)), one.ports()) for one in modules]
+    members = [member_of(one) for one in modules]
     order = Graph({"all": members}).order["all"]
     apart = Graph({member.name: [member] for member in members})
     orders = {

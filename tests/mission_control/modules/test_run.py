@@ -15,6 +15,7 @@ from sample_modules import Counter, Doubler, Number
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from mission_control.modules.graph import GraphRefused, NoProducer
+from mission_control.modules.orders import WrongModule
 from mission_control.modules.ports import type_name
 from mission_control.modules.run import UNIT, connected, run, run_units
 from mission_control.modules.run_in_processes import run_in_processes
@@ -65,6 +66,12 @@ def test_what_cannot_be_connected_is_refused_before_anything_runs() -> None:
 def test_a_listener_of_what_nobody_makes_is_refused_before_anything_runs(runs: Callable[..., object]) -> None:
     with pytest.raises(NothingToHear, match="did you mean 'twice'"):
         runs(Doubler(), Counter(), for_s=0.1, listen={"twise": print})
+
+
+@pytest.mark.parametrize("runs", [run, run_in_processes])
+def test_a_class_in_place_of_a_module_is_named(runs: Callable[..., object]) -> None:
+    with pytest.raises(WrongModule, match=r"<class 'sample_modules.Doubler'> is no module \(Give an instance"):
+        runs(Doubler, Counter, for_s=0.1)
 
 
 @pytest.mark.processes
