@@ -23,6 +23,7 @@ from backbone.naming import did_you_mean
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, Reader, write
 from mission_control.modules.module import Module, default_name
 from mission_control.modules.ports import Port, Ports, kinds_of_ports, ports_of, type_name
+from mission_control.modules.run import member_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -97,8 +98,13 @@ class ShownViews:
 
 
 def watched(module: AnyModule) -> AnyModule:
-    """Return the module; from now on each of its updates raises ``ModuleRuleBroken`` if it breaks a rule."""
-    name, update = default_name(type(module)), module.update
+    """Return the module; from now on each of its updates raises ``ModuleRuleBroken`` if it breaks a rule.
+
+    Raises:
+        WrongDeclaration: A port cannot be read from its declaration, or no unit could call ``update``.
+        WrongModule: It is no module, for example a class in place of its instance; the class stays as it is.
+    """
+    name, update = member_of(module).name, module.update
     handed_over = list[tuple[object, Pickles]]()
 
     def checked(inputs: Ports) -> Ports:

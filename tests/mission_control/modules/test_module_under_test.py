@@ -17,6 +17,7 @@ from mission_control.laboratory.module_kit.graph_under_test import GraphUnderTes
 from mission_control.laboratory.module_kit.module_under_test import MakeModule, ModuleRuleBroken, ModuleUnderTest
 from mission_control.modules.graph import GraphRefused
 from mission_control.modules.module import Module
+from mission_control.modules.orders import WrongModule
 from mission_control.modules.ports import LATEST
 
 
@@ -192,6 +193,17 @@ def test_a_reset_that_forgets_to_forget_is_found(module_under_test: MakeModule) 
         else:
             with pytest.raises(ModuleRuleBroken, match="update 1 of forgetful says something else after a reset"):
                 module.check_reset()
+
+
+def test_a_class_in_place_of_a_module_is_refused_and_stays_as_it_is(
+    module_under_test: MakeModule, module_graph: type[GraphUnderTest]
+) -> None:
+    """Its update was replaced for all later tests of the session."""
+    update: object = Doubler.update
+    for make in (module_under_test, module_graph):
+        with pytest.raises(WrongModule, match="is no module"):
+            make(Doubler)  # type: ignore[arg-type]
+    assert Doubler.update is update
 
 
 def test_what_a_module_shows_is_seen(module_under_test: MakeModule) -> None:
