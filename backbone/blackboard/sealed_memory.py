@@ -57,7 +57,8 @@ def sealed(value: bytes | memoryview) -> int:
     """Return the descriptor of a new sealed memory file with this content."""
     descriptor = os.memfd_create("scout-value", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
     try:
-        rest = memoryview(value).cast("B")
+        whole = memoryview(value)
+        rest = (whole if whole.c_contiguous else memoryview(whole.tobytes())).cast("B")
         at = 0
         while at < len(rest):
             at += os.pwrite(descriptor, rest[at:], at)

@@ -166,7 +166,8 @@ class BlackboardWriter:
     def put(self, value: bytes | memoryview) -> int:
         """Send this value to all readers, in place of values that they have not received; return its number.
 
-        Never waits for a reader. The bytes are copied once.
+        Never waits for a reader. The bytes are copied once; those of a view with gaps, which travel without the gaps,
+        twice.
 
         Raises:
             ValueTooLong: It is longer than ``most_bytes``.

@@ -40,6 +40,16 @@ def test_all_readers_get_a_value_whole_and_cannot_change_it(folder: Path, size: 
     writer.close()
 
 
+@pytest.mark.parametrize("size", [10, MOST_IN_PACKET + 1])
+def test_gaps_in_a_value_are_left_out_whatever_its_length(folder: Path, size: int) -> None:
+    writer, every = BlackboardWriter(folder, "room"), np.arange(2 * size).astype(np.uint8)
+    reader = BlackboardReader(folder, "room")
+    writer.put(memoryview(every)[::2])
+    assert bytes(taken(reader).data) == every[::2].tobytes()
+    reader.close()
+    writer.close()
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_a_reader_whose_socket_has_little_room_gets_every_value_too(
     folder: Path, size: int, monkeypatch: pytest.MonkeyPatch
