@@ -41,7 +41,7 @@ class Exchange(ExchangeCourse):
         now_s: Time of its begin.
     """
 
-    unready = ": its inputs did not come together"
+    unready = ": its unit had no round"
 
     def __init__(
         self, rules: ExchangeRules, is_ready: Callable[[], bool], changed: Callable[[], None], now_s: float
@@ -82,6 +82,7 @@ class Exchange(ExchangeCourse):
         kept = old()
         turned = self.tried(now_s, new)
         if turned is None:
+            self.unready = self.unready and ": its inputs did not come together"  # unless they did in an earlier round
             return kept
         self.unready = ""
         if not set(kept or ()) - set(turned) and self.tried(now_s, self._is_ready):

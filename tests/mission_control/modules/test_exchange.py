@@ -217,6 +217,14 @@ def test_time_passes_without_rounds() -> None:
     exchange.pass_time(0.5)
     assert exchange.phase is ExchangePhase.WARMING
     exchange.pass_time(1.0)
+    assert exchange.cause == "not ready within 1 s: its unit had no round"
+
+
+def test_what_a_new_one_lacked_is_named() -> None:
+    """A unit that stands still, or of 0.01 Hz, has no round at all; only in a round inputs can be missing."""
+    exchange = begun()
+    assert exchange.round(0.5, lambda: None, lambda: None) is None
+    exchange.pass_time(1.0)
     assert exchange.cause == "not ready within 1 s: its inputs did not come together"
 
 
