@@ -7,6 +7,7 @@ published.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable
 from threading import Lock
@@ -28,6 +29,7 @@ from backbone.debug_views import (
 )
 from backbone.keys import Conversation
 from backbone.naming import did_you_mean, legal
+from backbone.printable_text import printable
 from backbone.ranges import LONGEST_LINE, MOST_MEASURE, MOST_PIXEL_BYTES, MOST_PX
 from backbone.wire import Message
 
@@ -172,19 +174,24 @@ class DebugViews:
         self._bus.publish(view_address(self._bus.source, view), Conversation.VIEWS, shown)
 
 
-def sendable(value: Shown) -> Shown:
-    """Return the value in a form that fits a message; NaN and numbers out of range become text.
+def sendable(value: Any) -> Shown:
+    """Return the value in a form that fits a message: everything but flags and numbers in range becomes printable text.
+
+    A value of another type is no bug here, because it would end its behavior or unit only when a person looks.
 
     Example:
-        >>> sendable(3), sendable(True), sendable(float("nan"))
-        (3.0, True, 'nan')
+        >>> sendable(3), sendable(True), sendable(float("nan")), sendable(None)
+        (3.0, True, 'nan', 'None')
     """
-    if isinstance(value, str):
-        return value[:LONGEST_LINE]
     if isinstance(value, bool):
         return value
-    number = float(value)
-    return number if math.isfinite(number) and abs(number) <= MOST_MEASURE else str(number)
+    number = math.nan
+    if not isinstance(value, str):
+        with contextlib.suppress(TypeError, ValueError, OverflowError):  # an array of several; more than any float
+            number = float(value)
+    if math.isfinite(number) and abs(number) <= MOST_MEASURE:
+        return number
+    return printable(str(value), LONGEST_LINE)[:LONGEST_LINE]
 
 
 def picture_of(view: str, at_s: float, made: NDArray[Any]) -> ViewPicture:
