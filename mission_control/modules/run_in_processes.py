@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import multiprocessing
+import shutil
 import signal
 import tempfile
 import threading
@@ -243,5 +244,10 @@ def _become(launch: Launch, connection: Connection, inherited: Sequence[Connecti
 async def _live(launch: Launch, connection: Connection) -> None:
     clock = MissionClock(launch.clock_origin_monotonic_s)
     unit = _Unit(launch, _Unit.open_bus(launch, clock), clock)
-    asyncio.get_running_loop().add_reader(connection.fileno(), unit.end, "its script has ended")
+
+    def script_ended() -> None:
+        shutil.rmtree(launch.run_directory, ignore_errors=True)  # a script that was killed cannot do it
+        unit.end("its script has ended")
+
+    asyncio.get_running_loop().add_reader(connection.fileno(), script_ended)
     await unit.run()

@@ -41,11 +41,11 @@ print(len({{os.getpid(), *pids}}), sorted(told), told["smoothing"]["smoothing_ru
 """
 
 
-def script(*, falls: bool = False, for_s: str) -> subprocess.Popen[str]:
+def script(*, falls: bool = False, for_s: str, folder: str = "") -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-c", SCRIPT.format(falls=falls, for_s=for_s)],
         cwd=TOP,
-        env={"PYTHONPATH": str(EXAMPLES)},
+        env={"PYTHONPATH": str(EXAMPLES), "TMPDIR": folder},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -81,15 +81,17 @@ def test_a_process_that_falls_ends_the_run_with_its_name() -> None:
     assert "ModuleProcessFell: the process of falling ended" in complaint
 
 
-def test_the_processes_end_with_a_script_that_is_killed() -> None:
-    with script(for_s="60") as running:
+def test_the_processes_end_with_a_script_that_is_killed_and_leave_no_file(tmp_path: Path) -> None:
+    with script(for_s="60", folder=str(tmp_path)) as running:
         assert running.stdout is not None
         assert running.stdout.readline() == "wave\n"
+        assert list(tmp_path.iterdir())
         children = psutil.Process(running.pid).children(recursive=True)
         assert len(children) == 3
         running.kill()
         _gone, left = psutil.wait_procs(children, timeout=WITHIN_S)
         assert not left
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_cannot_be_connected_starts_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
