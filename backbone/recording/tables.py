@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from backbone.keys import Conversation
+from backbone.keys import Conversation, address_of
+from backbone.naming import component_of
 from backbone.recording.reader import Recorded
 
 FIRST_COLUMNS = ("at_s", "source", "sequence", "cause", "commanded_by")
@@ -86,17 +87,29 @@ class Commanders:
 
     def take(self, message: Recorded) -> None:
         """Record the owner of each ARC, the ARC of each epoch of an RC, and the person at each console."""
-        body = message.body
-        if not isinstance(body, dict):
-            return
-        if message.schema.startswith("Schedule/"):
-            self._owners.update((request["arc"], request["owner"]) for request in body.get("requests", []))
-            for rc in body.get("rcs", []):  # the recording may have begun after the ARC was connected
-                self._arcs.update(((rc["rc"], holder["epoch"]), holder["arc"]) for holder in rc["holders"])
-        elif message.schema.startswith("Connect/"):
-            self._arcs[message.key.split("/")[-2], body["epoch"]] = body["arc"]
-        elif message.schema.startswith("ComponentState/") and body.get("user"):
-            self._users[body["address"]] = body["user"]
+        match message.schema.partition("/")[0], message.body:  # in a foreign message of this name anything may stand
+            case "Schedule", dict(schedule):
+                self._take_schedule(schedule)
+            case "Connect", {"arc": str(arc), "epoch": int(epoch)}:
+                self._arcs[component_of(address_of(message.key)), epoch] = arc
+            case "ComponentState", {"address": str(address), "user": str(user)} if user:
+                self._users[address] = user
+
+    def _take_schedule(self, schedule: Mapping[str, Any]) -> None:
+        for request in _listed(schedule.get("requests")):
+            match request:
+                case {"arc": str(arc), "owner": str(owner)}:
+                    self._owners[arc] = owner
+        for rc in _listed(schedule.get("rcs")):  # the recording may have begun after the ARC was connected
+            match rc:
+                case {"rc": str(name), "holders": list(holders)}:
+                    self._take_holders(name, holders)
+
+    def _take_holders(self, rc: str, holders: list[Any]) -> None:
+        for holder in holders:
+            match holder:
+                case {"arc": str(arc), "epoch": int(epoch)}:
+                    self._arcs[rc, epoch] = arc
 
     def of(self, message: Recorded) -> str:
         """Return the commander of the robot of this message; empty: none, or the message is of no ARC."""
@@ -111,3 +124,7 @@ class Commanders:
         """Return the owner of an ARC, by the name of the person or behavior; empty: not known."""
         owner = self._owners.get(arc, "")
         return self._users.get(owner, owner.rpartition("/")[2])
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []

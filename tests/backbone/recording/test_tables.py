@@ -88,3 +88,20 @@ def test_what_is_told_later_is_known_from_the_first_message_on():
 @given(body=st.dictionaries(st.sampled_from(["arc", "rc", "epoch"]), leaves | st.lists(leaves) | st.just({"x": 1})))
 def test_in_a_modules_own_message_these_words_may_mean_anything(body: dict[str, Any]):
     assert Commanders().of(said("Path/1", body)) == ""
+
+
+@given(
+    name=st.sampled_from(["Schedule/1", "Connect/1", "ComponentState/2"]),
+    body=st.dictionaries(
+        st.sampled_from(["arc", "epoch", "requests", "rcs", "address", "user"]),
+        st.recursive(
+            leaves,
+            lambda inner: (
+                st.lists(inner, max_size=2)
+                | st.dictionaries(st.sampled_from(["arc", "rc", "owner", "holders", "epoch"]), inner)
+            ),
+        ),
+    ),
+)
+def test_a_foreign_message_of_a_known_name_may_have_any_form(name: str, body: dict[str, Any]):
+    Commanders().take(said(name, body))
