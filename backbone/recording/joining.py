@@ -28,7 +28,6 @@ from backbone.recording.reader import NoRecording, Recorded, Recording
 from backbone.recording.writer import ABOUT, CHUNK_BYTES, MIME_XML, MOST_CHANNELS, NS, PROFILE
 
 SAME_BEGIN_S = 2.0  # chosen: time services move a clock by less; no mission ends and begins again so soon
-PRESENCE = "Presence/1"
 
 Placed = tuple[int, Schema | None, Channel, Message, Recorded]
 """Corrected ``log_time`` of a message, and its records."""
@@ -148,13 +147,15 @@ def _each_once(messages: Iterable[Placed]) -> Iterator[Placed | None]:
         seen = set[object]()
         for placed in together:
             _ns, _schema, _channel, message, said = placed
-            if said.schema == PRESENCE:
-                is_new = alive.get(said.key) is not said.body["alive"]
-                alive[said.key] = said.body["alive"]
-            else:
-                name = (said.key, said.source, said.sequence, said.schema) if said.source else (said.key, message.data)
-                is_new = name not in seen
-                seen.add(name)
+            match said.schema, said.body:
+                case "Presence/1", {"alive": bool(is_alive)}:  # of any other form it is foreign
+                    is_new = alive.get(said.key) is not is_alive
+                    alive[said.key] = is_alive
+                case _:
+                    is_named = bool(said.source)
+                    name = (said.key, said.source, said.sequence, said.schema) if is_named else (said.key, message.data)
+                    is_new = name not in seen
+                    seen.add(name)
             yield placed if is_new else None
 
 

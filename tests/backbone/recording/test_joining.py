@@ -6,6 +6,7 @@ import io
 import json
 from collections.abc import Iterable
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -194,3 +195,15 @@ def test_messages_of_a_host_with_a_wrong_clock_are_put_in_the_order_of_causes(fa
     again = io.BytesIO()
     assert join({"joined.mcap": recording}, again).clocks.wrong == {}, "what is corrected is not corrected again"
     assert [*Recording(again).messages()] == found
+
+
+@pytest.mark.parametrize("fields", [[3], [], [{"alive": True}]])
+def test_a_foreign_message_named_as_a_presence_is_a_message(fields: list[object]) -> None:
+    file = io.BytesIO()
+    writer = RecordingWriter(file, CLASSES, ABOUT)
+    foreign = msgspec.msgpack.encode([WIRE_VERSION, SCOUT, 1, 1.0, "", ["Presence/1", *fields]])
+    writer.write(key_of(MISSION, SCOUT, Conversation.EVENTS), foreign, 1.0)
+    writer.finish()
+    done, recording = joined(file, file)
+    assert (done.messages, done.left_out) == (1, 1)
+    assert [one.body for one in recording.messages()] == [["Presence/1", *fields]]
