@@ -15,7 +15,7 @@ from backbone.command_line.unusable_file import new_folder
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.hearing import is_meant
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.tables import FIRST_COLUMNS, TOLD_IN, Commanders, row_of, table_of
+from backbone.recording.tables import FIRST_COLUMNS, TOLD_IN, Commanders, FileNames, row_of
 from backbone.spoken import counted
 
 VIDEOS = "mission_control.vision.recorded_video"  # named as text, because imports run downwards only
@@ -93,14 +93,14 @@ async def export_for_lerobot(
 
 
 def _write_tables(recording: Recording, tables: TableWriter, keys: tuple[str, ...]) -> tuple[int, int]:
-    split, names, count = tables.splits_lists, set(), 0
-    for table, rows in _batches((one, row_of(one, splits_lists=split)) for one in recording.messages(keys)):
+    split, names, found, count = tables.splits_lists, FileNames(), set(), 0
+    for table, rows in _batches(names, ((one, row_of(one, splits_lists=split)) for one in recording.messages(keys))):
         tables.learn(table, rows)
-        names.add(table)
+        found.add(table)
         count += len(rows)
-    for table, rows in _batches(_commanded_rows(recording, keys, splits_lists=split)):
+    for table, rows in _batches(names, _commanded_rows(recording, keys, splits_lists=split)):
         tables.write(table, rows)
-    return len(names), count
+    return len(found), count
 
 
 def _commanded_rows(
@@ -113,11 +113,13 @@ def _commanded_rows(
             yield message, row_of(message, commanders.of(message), splits_lists=splits_lists)
 
 
-def _batches(rows: Iterable[tuple[Recorded, dict[str, object]]]) -> Iterator[tuple[str, list[dict[str, object]]]]:
+def _batches(
+    names: FileNames, rows: Iterable[tuple[Recorded, dict[str, object]]]
+) -> Iterator[tuple[str, list[dict[str, object]]]]:
     """Yield table and rows, up to ``ROWS_AT_ONCE`` of them."""
     waiting: dict[str, list[dict[str, object]]] = defaultdict(list)
     for message, row in rows:
-        table = table_of(message)
+        table = names.of(message.key, message.schema or "bytes")
         waiting[table].append(row)
         if len(waiting[table]) >= ROWS_AT_ONCE:
             yield table, waiting.pop(table)

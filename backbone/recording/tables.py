@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -10,21 +11,43 @@ from backbone.naming import component_of
 from backbone.recording.reader import Recorded
 
 FIRST_COLUMNS = ("at_s", "source", "sequence", "cause", "commanded_by")
+LONGEST_NAME = 200  # chosen: with number and suffix it fits the 255 bytes of a file name
 LONGEST_LIST = 64  # chosen: a laser scan has more, and is not a table
 BYTES_OF = "pixels"
 """Field of a picture that gets no column."""
 TOLD_IN = tuple(f"*/{said}" for said in (Conversation.SCHEDULE, Conversation.ASK, Conversation.STATUS))
 """Keys of the messages by which ``Commanders`` knows them."""
+_NO_NAME = re.compile(r"[^\w.-]", re.ASCII)
 
 
-def table_of(message: Recorded) -> str:
-    """Return the name of the table to which the message belongs: its key and schema.
+class FileNames:
+    """Names of files, without suffix: one for each key and schema, and the same whenever it is asked for.
 
-    Example:
-        >>> table_of(Recorded("scout/night/resource_pool/scout1/readings", "", "Readings/1", 0, 0, 0, 0, "", {}))
-        'resource_pool_scout1_readings_Readings'
+    Characters that names in this program do not have are replaced; where two names would then be equal, the later one
+    ends with a number.
     """
-    return "_".join([*message.key.split("/")[2:], message.schema.partition("/")[0] or "bytes"])
+
+    def __init__(self) -> None:
+        self._names: dict[tuple[str, str], str] = {}
+
+    def of(self, key: str, schema: str = "") -> str:
+        """Return the name for a key, or for messages of one schema at a key; versions of a schema share it.
+
+        Example:
+            >>> names = FileNames()
+            >>> names.of("scout/night/resource_pool/scout1/readings", "Readings/1")
+            'resource_pool_scout1_readings_Readings'
+            >>> names.of("scout/night/resource_pool/scout1_readings", "Readings/1")
+            'resource_pool_scout1_readings_Readings_2'
+        """
+        named = key, schema.partition("/")[0]
+        if named not in self._names:
+            parts = filter(None, (*key.split("/")[2:], named[1]))
+            name = _NO_NAME.sub("-", "_".join(parts))[:LONGEST_NAME]
+            taken = {one.lower() for one in self._names.values()}  # many discs do not tell A from a
+            numbered = (name, *(f"{name}_{number}" for number in range(2, len(taken) + 3)))
+            self._names[named] = next(one for one in numbered if one.lower() not in taken)
+        return self._names[named]
 
 
 def row_of(message: Recorded, commanded_by: str = "", *, splits_lists: bool = True) -> dict[str, Any]:

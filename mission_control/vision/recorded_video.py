@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from backbone.errors import Refusal
 from backbone.recording.hearing import is_meant
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.tables import TOLD_IN, Commanders
+from backbone.recording.tables import TOLD_IN, Commanders, FileNames
 
 RATE_HZ = 15.0  # NTSC framegrabber of the Scouts at half rate; a gap in time is a gap in the recording
 LINE_PX = 24  # chosen: a line of text below the picture
@@ -38,13 +38,13 @@ def write_videos(recording: Recording, folder: Path, keys: tuple[str, ...]) -> l
         NoVideo: A file could not be opened, or is not complete.
     """
     commanders = Commanders(recording.messages(TOLD_IN, newest_first=True))
-    videos: dict[str, _Video] = {}
+    names, videos = FileNames(), dict[str, _Video]()
     try:
         for message in recording.messages():
             commanders.take(message)
             if not _is_picture(message) or (keys and not is_meant(message.key, keys)):
                 continue
-            name = "_".join(message.key.split("/")[2:])
+            name = names.of(message.key)
             if name not in videos:
                 videos[name] = _Video(folder / f"{name}.mp4")
             by = commanders.of(message) or "nobody"

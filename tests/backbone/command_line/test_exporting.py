@@ -83,6 +83,17 @@ async def test_csv_files_hold_the_same_as_text(night: Path, tmp_path: Path) -> N
     assert schedule["requests.0.arc"] == ARC
 
 
+async def test_keys_whose_parts_join_to_the_same_name_have_files_of_their_own(tmp_path: Path) -> None:
+    addresses = ("resource_pool/a/b", "resource_pool/a_b")
+    path, folder = tmp_path / "night.mcap", tmp_path / "out"
+    told = [Said(1.0, one, Conversation.READINGS, Readings(one, 1.0, {"x": 1.0}), one) for one in addresses]
+    path.write_bytes(recorded(told).getvalue())
+    await export(path, folder, (), CsvTables, with_videos=False)
+    assert [[row["source"] for row in rows_of(file)] for file in sorted(folder.iterdir())] == [
+        [one] for one in addresses
+    ]
+
+
 def scout_backbone(*words: str, begin: str = "") -> subprocess.CompletedProcess[str]:
     code = f"import sys\n{begin}\nfrom backbone.command_line.cli import app; app({list(words)!r})"
     return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.recording.reader import Recorded
-from backbone.recording.tables import Commanders, columns_of, row_of, table_of
+from backbone.recording.tables import LONGEST_NAME, Commanders, FileNames, columns_of, row_of
 
 FRAMES = "scout/night/resource_pool/anna-drive/frames"
 leaves = st.none() | st.booleans() | st.integers(-9, 9) | st.floats(-9, 9) | st.text(max_size=3)
@@ -40,7 +40,6 @@ def test_a_row_has_each_value_once(body: dict[str, Any]):
 
 def test_pictures_are_no_columns():
     assert "pixels" not in row_of(said("Frame/1", {"number": 1, "pixels": "aGFsbG8="}))
-    assert table_of(said("Frame/1", {})) == "resource_pool_anna-drive_frames_Frame"
 
 
 def test_a_person_is_named_by_name_a_behavior_by_its_own_and_nobody_is_empty():
@@ -105,3 +104,24 @@ def test_in_a_modules_own_message_these_words_may_mean_anything(body: dict[str, 
 )
 def test_a_foreign_message_of_a_known_name_may_have_any_form(name: str, body: dict[str, Any]):
     Commanders().take(said(name, body))
+
+
+segments = st.text(st.characters(exclude_characters="/"), min_size=1, max_size=9) | st.sampled_from(["a", "a_b", "A"])
+
+
+@given(named=st.lists(st.tuples(st.lists(segments, max_size=4).map(tuple), segments), unique=True))
+def test_each_key_and_schema_has_a_file_of_its_own_whatever_characters_they_have(
+    named: list[tuple[tuple[str, ...], str]],
+):
+    names = FileNames()
+    asked = [("/".join(["scout", "night", *key]), schema) for key, schema in named]
+    found = [names.of(*one) for one in asked]
+    assert len({name.lower() for name in found}) == len(set(asked))
+    assert [names.of(*one) for one in asked] == found
+    assert all(name.isascii() and name.isprintable() and "/" not in name for name in found)
+
+
+def test_versions_of_a_schema_share_a_file_and_a_long_name_is_cut():
+    names = FileNames()
+    assert names.of(FRAMES, "Frame/1") == names.of(FRAMES, "Frame/2") == "resource_pool_anna-drive_frames_Frame"
+    assert len(names.of(FRAMES, "x" * 999)) == LONGEST_NAME
