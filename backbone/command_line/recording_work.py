@@ -237,7 +237,8 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
     with opened(to) as made:
         assert made.contents().messages == done.messages  # noqa: S101  what was written can be read
     without = f", without those of {counted(done.damaged, 'damaged chunk')}" if done.damaged else ""
-    say(f"{to}: {counted(done.messages, 'message')}{without}")
+    unread = f"; the last {counted(done.unread_bytes, 'byte')} of {path} cannot be read" if done.unread_bytes else ""
+    say(f"{to}: {counted(done.messages, 'message')}{without}{unread}")
     return ExitCode.DONE
 
 

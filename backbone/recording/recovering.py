@@ -1,21 +1,24 @@
 """Recovering: a whole recording of what is readable of one that is damaged, or whose recorder was killed.
 
 Rules of this file: a damaged chunk costs its own messages alone, and is counted. Of a file that is cut, or damaged
-between two chunks, all before that place is kept.
+between two chunks, all before that place is kept, and the length of the rest is told.
 """
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 
 from backbone.recording.reader import DAMAGED, MOST_RECORD_BYTES, NoRecording, NotOfMessages, check_index, open_file
 from backbone.recording.writer import CHUNK_BYTES, PROFILE
+
+_CHUNK_BYTES = 49  # MCAP specification, op 0x06: all but the compression's name and the records
 
 
 class Recovered(NamedTuple):
@@ -24,10 +27,12 @@ class Recovered(NamedTuple):
     Attributes:
         messages: Number of messages in the new recording.
         damaged: Number of chunks, of some 250 kB, whose messages cannot be read.
+        unread_bytes: Length of the end of the file, after the last place at which it can be read; 0: read to its end.
     """
 
     messages: int
     damaged: int
+    unread_bytes: int
 
 
 class _WholeRecording:
@@ -71,26 +76,35 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
     Raises:
         NoRecording: Not even the begin is there; ``NotOfMessages``: it is a copy for other tools.
     """
-    whole, lost, has_begun = _WholeRecording(to), 0, False
-    names = _names_in_index(damaged)
+    whole, lost, has_begun, has_all = _WholeRecording(to), 0, False, False
+    names, size = _names_in_index(damaged), damaged.seek(0, os.SEEK_END)
+    read_to = damaged.seek(0)
     reader = StreamReader(
         cast("Any", damaged), emit_chunks=True, validate_crcs=True, record_size_limit=MOST_RECORD_BYTES
     )
     try:
         for record in reader.records:
-            has_begun = True
+            has_begun, has_all = True, has_all or isinstance(record, DataEnd)
             if isinstance(record, Chunk):
                 lost += not _took_chunk(whole, record, names)
             else:
                 whole.take(record)
+            read_to = read_to + _size(record) if isinstance(record, Chunk) else damaged.tell()
+        read_to = damaged.tell()  # after the last record stand 8 bytes more
     except DAMAGED as error:
         if not has_begun:
             why = str(error) or "it is too short"
             raise NoRecording(
                 f"no recording: {why}", remedy="Name a recording; this file has nothing of one."
             ) from error
+        read_to = size if has_all else read_to  # what follows is the index, which is made anew
     whole.finish()
-    return Recovered(whole.messages, lost)
+    return Recovered(whole.messages, lost, size - read_to)
+
+
+def _size(chunk: Chunk) -> int:
+    """Return the bytes of a chunk in its file; with a wrong length, the library skips all that follows it."""
+    return _CHUNK_BYTES + len(chunk.compression) + len(chunk.data)
 
 
 def recover_file(path: Path, to: Path) -> Recovered:

@@ -90,7 +90,7 @@ def test_of_a_recording_cut_anywhere_all_that_came_before_the_cut_is_recovered(
     cut = data.draw(st.integers(0, len(whole)))
     made = io.BytesIO()
     try:
-        count, damaged = recover(io.BytesIO(whole[:cut]), made)
+        count, damaged, unread = recover(io.BytesIO(whole[:cut]), made)
     except NoRecording:
         assert cut < 64, "only a file without even a header is none"
         return
@@ -98,7 +98,7 @@ def test_of_a_recording_cut_anywhere_all_that_came_before_the_cut_is_recovered(
     assert [one.sequence for one in found] == [*range(count)], "no gap, none twice"
     assert damaged == 0
     if cut == len(whole):
-        assert count == flushed
+        assert (count, unread) == (flushed, 0)
 
 
 @given(st.data())
@@ -149,13 +149,28 @@ def test_an_unfinished_recording_names_the_remedy_and_recovers(tmp_path: Path) -
         recover_file(broken, whole)
 
 
+def test_what_cannot_be_read_after_the_last_chunk_is_told_by_its_length() -> None:
+    data, _ = recorded([0, 1] * 3, frozenset({1, 3}))
+    index = SeekingReader(io.BytesIO(data)).get_summary().chunk_indexes  # type: ignore[union-attr]
+    second, third = index[1].chunk_start_offset, index[1].chunk_start_offset + index[1].chunk_length
+    broken = bytearray(data)
+    broken[second + 4] ^= 1  # its length
+    for file, expected in (
+        (data, (6, 0, 0)),
+        (bytes(broken), (4, 0, len(data) - third)),
+        (data + data, (6, 0, len(data))),
+        (data[:-20], (6, 0, 0)),  # the index is cut, no message
+    ):
+        assert recover(io.BytesIO(file), io.BytesIO()) == expected
+
+
 @pytest.mark.parametrize("at", [0, 1, 2])
 def test_a_damaged_chunk_costs_its_own_messages_alone(at: int) -> None:
     data, _ = recorded([0, 1] * 3, frozenset({1, 3}))
     chunks = [one.chunk_start_offset for one in SeekingReader(io.BytesIO(data)).get_summary().chunk_indexes]  # type: ignore[union-attr]
     broken, made = bytearray(data), io.BytesIO()
     broken[chunks[at] + 100] ^= 1
-    assert recover(io.BytesIO(broken), made) == (4, 1)
+    assert recover(io.BytesIO(broken), made) == (4, 1, 0)
     assert [one.sequence for one in read(made.getvalue())] == [n for n in range(6) if n // 2 != at]
 
 
