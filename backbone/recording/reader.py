@@ -297,4 +297,7 @@ def _recorded(channel: Channel, message: Message) -> Recorded:
     if channel.message_encoding != "json":
         return Recorded(key, source, schema, at_s, at_s, at_s, message.sequence, "", message.data)
     said = msgspec.json.decode(message.data)
-    return Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)
+    try:
+        return Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)
+    except TypeError as error:
+        raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: {error}") from error

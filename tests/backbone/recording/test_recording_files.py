@@ -14,15 +14,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import SeekingReader
+from mcap.writer import Writer
 
 from backbone.bus.interface import Copies, Told
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.recording.hearing import is_meant
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import NoRecording, Recorded, Recording, open_file
+from backbone.recording.reader import NoRecording, NotOfMessages, Recorded, Recording, open_file
 from backbone.recording.recovering import recover, recover_file
 from backbone.recording.revival import revived
-from backbone.recording.writer import RecordingWriter
+from backbone.recording.writer import PROFILE, RecordingWriter
 from backbone.wire import Envelope, Message, write
 
 CLASSES = message_classes()
@@ -275,3 +276,19 @@ def test_copies_inside_copies_are_not_followed() -> None:
     made.write("scout/night/x/y/told", inner, 0.0)
     made.finish()
     assert [one.schema for one in read(file.getvalue())] == ["Told/1", ""]
+
+
+@pytest.mark.parametrize("data", [b"{}", b"7", b'{"x": 1}', b"[]"])
+def test_messages_of_another_form_are_refused(data: bytes) -> None:
+    with pytest.raises(NotOfMessages):
+        read(foreign(PROFILE, data).getvalue())
+
+
+def foreign(profile: str, data: bytes) -> io.BytesIO:
+    """Return another program's MCAP file, of this profile, with one JSON message."""
+    file = io.BytesIO()
+    made = Writer(file)
+    made.start(profile=profile)
+    made.add_message(made.register_channel("/t", "json", 0), 0, data, 0)
+    made.finish()
+    return file
