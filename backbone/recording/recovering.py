@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 from backbone.recording.reader import DAMAGED, MOST_RECORD_BYTES, NoRecording, NotOfMessages, check_index, open_file
 from backbone.recording.writer import CHUNK_BYTES, PROFILE
 
+_OTHER_PROFILES = {"", "ros1", "ros2", "px4"}  # none, and the well-known ones of the MCAP specification
 _CHUNK_BYTES = 49  # MCAP specification, op 0x06: all but the compression's name and the records
 
 
@@ -48,8 +49,8 @@ class _WholeRecording:
     def take(self, record: McapRecord) -> None:
         """Write the record; one that is written already, or of no use, is not."""
         match record:
-            case Header(profile=""):  # any other may be damaged
-                raise NotOfMessages(f"the file is of profile '', a recording of {PROFILE!r}")
+            case Header(profile=profile) if profile in _OTHER_PROFILES:  # any other may be damaged
+                raise NotOfMessages(f"the file is of profile {profile!r}, a recording of {PROFILE!r}")
             case Schema() if record.id not in self._schemas:
                 self._schemas[record.id] = self._writer.register_schema(record.name, record.encoding, record.data)
             case Channel() if record.id not in self._channels:
@@ -74,7 +75,7 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
     """Write a whole recording with all messages that can be read; return how many.
 
     Raises:
-        NoRecording: Not even the begin is there; ``NotOfMessages``: it is a copy for other tools.
+        NoRecording: Not even the begin is there; ``NotOfMessages``: it is another program's file.
     """
     whole, lost, has_begun, has_all = _WholeRecording(to), 0, False, False
     names, size = _names_in_index(damaged), damaged.seek(0, os.SEEK_END)

@@ -284,6 +284,12 @@ def test_messages_of_another_form_are_refused(data: bytes) -> None:
         read(foreign(PROFILE, data).getvalue())
 
 
+@pytest.mark.parametrize("profile", ["", "ros1", "ros2", "px4"])
+def test_a_file_of_another_program_is_not_recovered(profile: str) -> None:
+    with pytest.raises(NotOfMessages):
+        recover(foreign(profile, b"{}"), io.BytesIO())
+
+
 def foreign(profile: str, data: bytes) -> io.BytesIO:
     """Return another program's MCAP file, of this profile, with one JSON message."""
     file = io.BytesIO()
