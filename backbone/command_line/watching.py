@@ -68,13 +68,14 @@ class Watched:
 
 async def watch(where: Where, wanted: Watched) -> ExitCode:
     """Print messages as they come, until a signal, the time, the number or the end of the mission ends it."""
-    enough, shown = asyncio.Event(), 0
+    enough, came, shown = asyncio.Event(), 0, 0
     printer = LinePrinter(enough.set)
 
     def heard(key: str, message: Translated, at_s: float) -> None:
-        nonlocal shown
+        nonlocal came, shown
         if enough.is_set():
             return
+        came += 1
         for line in _lines(key, message, at_s, wanted):
             printer.put(line)
             shown += 1
@@ -89,6 +90,8 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
         await first_of(ended.wait(), enough.wait())
         enough.set()
     await printer.end()
+    if came and not shown:
+        say(f"none of {counted(came, 'message')} has a value in {wanted.field!r}; --json shows their fields")
     if dropped := printer.dropped + sum(one.dropped for one in subscribed):
         say(f"incomplete: {counted(dropped, 'message')} came faster than they were read")
     return ExitCode.DONE

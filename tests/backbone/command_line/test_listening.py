@@ -16,9 +16,10 @@ from backbone.command_line import watching
 from backbone.command_line.listening import GONE_AFTER_S, until_ended
 from backbone.command_line.watching import Watched
 from backbone.command_line.where import Where
-from backbone.component.messages import AskTime, MissionTime
+from backbone.component.messages import AskTime, LogLevel, MissionTime, StoryEvent
 from backbone.component.mission_time import REPLY_TIME_S
 from backbone.debug_views import LookAt, LookedAt, ViewEntry, ViewKind, Views
+from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
 from ui_console.terminal import look
 
@@ -147,6 +148,30 @@ def test_who_watches_a_mission_ends_with_it(
     monkeypatch.setattr(watching, "connected", connected)
     assert run_virtual(play()) == pytest.approx(20.0 + GONE_AFTER_S, abs=1.0)
     assert "night has ended" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("field", "is_told"), [("what", False), ("waht", True)])
+def test_a_field_that_no_message_has_is_told(
+    field: str, is_told: bool, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    network, clock = LocalNetwork("night"), VirtualClock()
+
+    @asynccontextmanager
+    async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
+        yield LocalBus(network, SELF, clock), clock
+
+    async def play() -> None:
+        watches = asyncio.create_task(watching.watch(ANY, Watched((), field, for_s=10.0)))
+        await clock.sleep_s(5.0)
+        told = StoryEvent(1.0, BEHAVIOR, "motion seen", "scout1", "", LogLevel.INFO)
+        LocalBus(network, BEHAVIOR, clock).publish(BEHAVIOR, Conversation.LOG, told)
+        await watches
+
+    monkeypatch.setattr(watching, "connected", connected)
+    run_virtual(play())
+    shown = capfd.readouterr()
+    assert ("none of 1 message has a value in 'waht'" in shown.err) is is_told
+    assert ("motion seen" in shown.out) is not is_told
 
 
 def test_who_looks_into_a_behavior_ends_with_its_mission(
