@@ -281,7 +281,7 @@ async def print_keys(path: Path, *, as_json: bool) -> ExitCode:
     """Print a line for each key, sender and schema."""
     with opened(path) as recording:
         found = recording.contents()
-    lasted_s = max(found.end_s - found.begin_s, 1e-9)
+    lasted_s = found.end_s - found.begin_s
     rows = [
         {"key": one.key, "source": one.source, "schema": one.schema, "messages": one.messages} for one in found.counts
     ]
@@ -289,11 +289,16 @@ async def print_keys(path: Path, *, as_json: bool) -> ExitCode:
         show(json.dumps(row) for row in rows)
         return ExitCode.DONE
     show(
-        f"{one.messages:8d} {one.messages / lasted_s:9.2f}/s  {one.key or 'several keys'}  {one.schema or 'no message'}"
+        f"{one.messages:8d} {_rate(one.messages, lasted_s)}  {one.key or 'several keys'}  {one.schema or 'no message'}"
         + ("" if one.key.split("/", 2)[-1].startswith(one.source) else f"  from {one.source}")
         for one in found.counts
     )
     return ExitCode.DONE
+
+
+def _rate(messages: int, lasted_s: float) -> str:
+    """Return messages a second; messages of one instant have no rate."""
+    return f"{messages / lasted_s:9.2f}/s" if lasted_s else f"{'-':>9s}  "
 
 
 async def print_messages(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from small_recordings import SCOUT, Said, recorded
 
-from backbone.command_line.recording_work import print_events
+from backbone.command_line.recording_work import print_events, print_keys
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
@@ -48,3 +48,14 @@ async def test_an_event_of_several_lines_is_one_line_and_forges_no_other(
     assert await print_events(path, "", 0.0, None, as_json=False) is ExitCode.DONE
     [line] = capsys.readouterr().out.splitlines()
     assert r"is well\n " in line
+
+
+@pytest.mark.parametrize(("times_s", "shown"), [((1.0, 1.0), "2         -  "), ((1.0, 3.0), "2      1.00/s")])
+async def test_messages_of_one_instant_have_no_rate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], times_s: tuple[float, ...], shown: str
+) -> None:
+    path = tmp_path / "night.mcap"
+    told = (Said(at_s, SCOUT, Conversation.LOG, StoryEvent(at_s, SCOUT, "", "", "", LogLevel.INFO)) for at_s in times_s)
+    path.write_bytes(recorded(told).getvalue())
+    assert await print_keys(path, as_json=False) is ExitCode.DONE
+    assert shown in capsys.readouterr().out
