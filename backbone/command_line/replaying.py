@@ -225,7 +225,8 @@ class _Collector:
 async def _play_to_end(player: Player) -> None:
     await player.run()
     gc.enable()
-    say(f"the recording is over, {counted(player.played, 'publication')}; questions are still answered")
+    without = f", without {player.left_out} of a form that no class here has" if player.left_out else ""
+    say(f"the recording is over, {counted(player.played, 'publication')}{without}; questions are still answered")
     await asyncio.Event().wait()
 
 

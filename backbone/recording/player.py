@@ -77,6 +77,8 @@ class Player:
         """Called before each message with the seconds of the machine until its time; settable."""
         self.played = 0
         """Number of publications so far."""
+        self.left_out = 0
+        """Number of recorded publications that were not played, because no class known here has their form."""
 
     def catch_up(self) -> None:
         """Apply all earlier messages, and decode the next ones. Uses no bus, so it may run in a thread.
@@ -148,9 +150,12 @@ class Player:
 
     def _play(self, following: Ready) -> None:
         message, said = following.message, following.said
-        if said is not None and self._is_published(message.key):
-            self._publish(message, said)
-            self.played += 1
+        if self._is_published(message.key):
+            if said is not None:
+                self._publish(message, said)
+                self.played += 1
+            else:
+                self.left_out += 1
         if isinstance(said, Presence) and message.key.endswith(f"/{Conversation.ALIVE}"):
             self._token_changed(address_of(message.key), is_up=said.alive)
         self._untaken.append(following)

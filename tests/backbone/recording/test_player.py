@@ -274,10 +274,17 @@ def test_a_console_may_register_and_a_person_may_end_it():
     assert ended == [True]
 
 
-def test_a_message_of_an_unknown_class_is_passed_over():
+def test_a_message_of_an_unknown_class_is_passed_over_and_counted():
+    counts: list[tuple[int, int]] = []
+
+    async def count(_ear: LocalBus, clock: VirtualClock, player: Player) -> None:
+        await clock.sleep_s(6.0)
+        counts.append((player.played, player.left_out))
+
     known = {schema: kind for schema, kind in CLASSES.items() if kind is not ComponentState}
-    heard = played(recording_of(*MORNING), classes=known)
+    heard = played(recording_of(*MORNING), count, classes=known)
     assert [said for _at_s, said, _envelope in heard] == [Conversation.LOG, Conversation.LOG]
+    assert counts == [(2, 2)]
 
 
 def test_who_comes_to_look_is_there_until_it_leaves():
