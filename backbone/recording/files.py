@@ -33,8 +33,8 @@ class RecordingFiles:
 
     @property
     def oldest(self) -> Path:
-        """Path of the oldest file that is kept."""
-        return self._kept[0]
+        """Path of the oldest file that is kept, and was not deleted by a person; the open file, if none is left."""
+        return next((path for path in self._kept if path.exists()), self.path)
 
     @property
     def is_deleted(self) -> bool:

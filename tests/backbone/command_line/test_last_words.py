@@ -50,6 +50,8 @@ def test_the_oldest_file_that_is_left_is_known(tmp_path: Path) -> None:
     files.close()
     assert files.oldest == tmp_path / "night-2.mcap"
     assert files.oldest.exists()
+    files.oldest.unlink()
+    assert files.oldest == tmp_path / "night-3.mcap", "a person deleted the second"
 
 
 def test_an_unknown_attribute_is_refused_also_as_json(monkeypatch: pytest.MonkeyPatch) -> None:
