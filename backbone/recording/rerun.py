@@ -105,7 +105,8 @@ def launch_of(recording: Recording, classes: Known, name: str) -> Launch:
                 incarnation=incarnation,
             )
     lacks = "state" if state is None else "parameters" if parameters is None else f"type {state.type!r}"
-    raise NoSuchComponent(f"the recording has no {lacks} of {name!r}{did_you_mean(name, seen)}")
+    hint = did_you_mean(name, seen) if state is None else ""
+    raise NoSuchComponent(f"the recording has no {lacks} of {name!r}{hint}")
 
 
 def _incarnation(recording: Recording, name: str) -> str:

@@ -10,9 +10,12 @@ from typing import Any
 import msgspec
 import pytest
 from recorded_missions import CLASSES, record_mission
+from small_recordings import SCOUT, Said, recorded
 
 from backbone.component.class_path import load_class
 from backbone.component.launch import Launch
+from backbone.component.messages import ComponentState, LifeState
+from backbone.keys import Conversation
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
 from backbone.recording.comparison import KeyComparison, compared
@@ -104,6 +107,14 @@ def test_a_component_that_falls_is_told(recording: Recording):
 def test_of_nobody_there_is_no_launch(recording: Recording):
     with pytest.raises(NoSuchComponent, match="watch-scout1"):
         launch_of(recording, CLASSES, "watch-scot1")
+
+
+def test_who_is_there_and_cannot_be_launched_is_not_meant_to_be_itself() -> None:
+    state = ComponentState(SCOUT, "scout", "base", 7, LifeState.READY, 0.5, "")
+    without_parameters = Recording(recorded([Said(1.0, SCOUT, Conversation.STATUS, state)]))
+    with pytest.raises(NoSuchComponent) as refused:
+        launch_of(without_parameters, CLASSES, "scout1")
+    assert refused.value.detail == "the recording has no parameters of 'scout1'"
 
 
 def test_the_messages_of_a_units_modules_and_of_its_exchanges_are_known(
