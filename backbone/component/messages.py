@@ -29,7 +29,7 @@ class AskState(Message, frozen=True):
 
 
 class Absence(Message, frozen=True):
-    """A component that its owner wants and that does not run, or does not respond.
+    """A component that its owner wants and that does not run, does not respond, or cannot do its work.
 
     Attributes:
         since_s: Mission time at which its owner found it missing.
@@ -37,6 +37,7 @@ class Absence(Message, frozen=True):
         doing: What its owner does to start it, one line; empty: nothing.
         remedy: What an operator can do; empty: no action is needed.
         vital: True if the mission cannot work without it (core services).
+        is_running: True if it runs and cannot do its work.
     """
 
     name: Mention
@@ -45,6 +46,7 @@ class Absence(Message, frozen=True):
     doing: Text = ""
     remedy: Text = ""
     vital: bool = False
+    is_running: bool = False
 
 
 class StandingStop(Message, frozen=True):

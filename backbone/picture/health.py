@@ -3,8 +3,8 @@
 Rules of this file: pure; observations go in, the verdict comes out. Each owner reports its absent components
 (``Component.absences``); this file joins these reports with the absences that the observer found itself.
 
-* ``ok``: no wanted component is absent.
-* ``degraded``: a wanted component is absent, and its owner is restarting it.
+* ``ok``: no wanted component is absent, and all can do their work.
+* ``degraded``: a wanted component is absent, or cannot do its work, and its owner tries again.
 * ``failed``: a vital component has been absent for longer than ``FAILED_AFTER_S``, or the owner of an absent
   component makes no further attempt to start it.
 """

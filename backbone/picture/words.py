@@ -69,7 +69,8 @@ def absence_line(absence: Absence, now_s: float) -> str:
         >>> absence_line(Absence("scout1", 2.0, "killed by SIGKILL", "starts again in 0.1 s"), 3.5)
         'scout1 is absent for 1.5 s: killed by SIGKILL; starts again in 0.1 s'
     """
-    parts = [f"{absence.name} is absent for {max(0.0, now_s - absence.since_s):.1f} s: {absence.cause}"]
+    is_what = "has not worked" if absence.is_running else "is absent"
+    parts = [f"{absence.name} {is_what} for {max(0.0, now_s - absence.since_s):.1f} s: {absence.cause}"]
     parts += [part for part in (absence.doing, absence.remedy) if part]
     return "; ".join(parts)
 

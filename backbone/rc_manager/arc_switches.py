@@ -7,10 +7,14 @@ from collections.abc import Callable, Coroutine, Iterable
 from typing import Protocol
 
 from backbone.bus.interface import Clock
+from backbone.component.messages import Absence
 from backbone.rc_manager.context_switch import ContextSwitch
 from backbone.rc_manager.rc_watch import RcWatch
 from backbone.rc_manager.switch_times import SwitchTimes
 from backbone.scheduling.events import ConnectArc, Event, Freed, Opened, OpenFailed, RevokeArc
+from backbone.scheduling.explain.answers import Unservable
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.waiting import end_tasks
 
 
@@ -18,6 +22,7 @@ class SwitchService(Protocol):
     """The interface of the RC manager for its switches."""
 
     clock: Clock
+    manager: ScheduleManager
 
     def happened(self, event: Event) -> None:
         """Pass the event to the schedule manager, and carry out its instructions."""
@@ -40,6 +45,7 @@ class ArcSwitches:
         self._service, self._context_switch, self._rcs, self._grace_s = service, context_switch, rcs, grace_s
         self._under_way: dict[str, asyncio.Task[None]] = {}
         self._times = SwitchTimes()
+        self._vain_since_s: dict[str, float] = {}
 
     def __contains__(self, arc: str) -> bool:
         """Return whether a switch of this ARC is running."""
@@ -53,6 +59,20 @@ class ArcSwitches:
     def statistics(self) -> dict[str, float]:
         """Return numbers and times of switches."""
         return self._times.statistics()
+
+    def absences(self, unservable: Iterable[Unservable]) -> list[Absence]:
+        """Return these ARCs, and those that want time and did not open their gate when they last were connected."""
+        arcs, doing = self._service.manager.master_schedule.state.arcs, "the RC manager connects it again"
+        self._vain_since_s = {arc: since_s for arc, since_s in self._vain_since_s.items() if arc in arcs}
+        never = [
+            Absence(arc, since_s, why, f"waits until {until}", is_running=True)
+            for arc, since_s, why, until in unservable
+        ]
+        return never + [
+            Absence(arc, since_s, self._context_switch.complaint(arc), doing, is_running=True)
+            for arc, since_s in self._vain_since_s.items()
+            if arcs[arc].state is not RequestState.IDLE or arcs[arc].retry_s is not None
+        ]
 
     def connect(self, order: ConnectArc) -> None:
         """Connect the ARC to its RCs."""
@@ -80,11 +100,14 @@ class ArcSwitches:
         vain = await self._context_switch.connect(order, self._release_s(order.epochs))
         if vain is None:
             self._rcs.connected(order.epochs)
+            self._vain_since_s.pop(order.arc, None)
             self._times.granted(order.epochs, order.arc, order.settle_s, self._service.clock.now_s())
             self._service.happened(Opened(order.arc))
             return
         if vain.failed:
             self._rcs.failed(vain.failed)
+        else:
+            self._vain_since_s.setdefault(order.arc, self._service.clock.now_s())
         for rc in vain.unconfirmed:
             self._rcs.does_not_answer(rc)
         self._service.happened(OpenFailed(order.arc, vain.failed))

@@ -73,11 +73,21 @@ class ContextSwitch:
     def __init__(self, bus: Bus, clock: Clock, note: Note, may_leave: Callable[[str, str], bool]) -> None:
         self._bus, self._clock, self._note, self._may_leave = bus, clock, note, may_leave
         self._given_back: set[str] = set()
+        self._complaints: dict[str, str] = {}
         self._left: defaultdict[str, dict[Hold, float]] = defaultdict(dict)
 
     def gives_back(self, arc: str) -> bool:
         """Return whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
         return arc in self._given_back
+
+    def complain(self, subject: str, what: str, error: Refusal | LinkError) -> None:
+        """Add the failure of an RC or ARC to its story, and keep it as its last one."""
+        self._note(subject, f"{what}: {error}")
+        self._complaints[subject] = f"{what}: {error.detail if isinstance(error, Refusal) else error}"
+
+    def complaint(self, subject: str) -> str:
+        """Return the last failure of an RC or ARC."""
+        return self._complaints.get(subject, "")
 
     async def connect(self, order: ConnectArc, within_s: float) -> Vain | None:
         """Connect all RCs to the ARC and order it to open its gate, or undo all of it.
@@ -157,7 +167,7 @@ class ContextSwitch:
         for rc, outcome in zip(epochs, outcomes, strict=True):
             if isinstance(outcome, Refusal | LinkError):
                 log.warning("%s could not be connected to %s: %s", rc, order.arc, outcome)
-                self._note(rc, f"could not be connected to {order.arc}: {outcome}")
+                self.complain(rc, f"could not be connected to {order.arc}", outcome)
                 return rc
             if outcome is not None:
                 raise outcome
@@ -169,7 +179,7 @@ class ContextSwitch:
             await self._bus.ask(in_pool(order.arc), question, GateOpens, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
             log.warning("%s did not open: %s", order.arc, error)
-            self._note(order.arc, f"did not open its gate: {error}")
+            self.complain(order.arc, "did not open its gate", error)
             return False
         await self._clock.sleep_until_s(settled_s)  # the ARC opens by the same clock: it need not report that
         return True
@@ -194,15 +204,16 @@ class ContextSwitch:
     async def _end(self, hold: Hold, reason: str, lease_until_s: float, free_by_s: float) -> bool:
         """Disconnect one RC; return whether it confirmed."""
         rc, arc, epoch = hold
-        complain = self._note
+        has_complained = False
         while (left_s := self._real_s(lease_until_s)) > 0:
             within_s = min(RC_REPLY_S, left_s, max(CONFIRM_S, self._real_s(free_by_s)))
             try:
                 await self._bus.ask(in_pool(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=within_s)
                 return True
             except (Refusal, LinkError) as error:
-                complain(rc, f"did not confirm its disconnection from {arc}: {error}")
-                complain = _keep_quiet
+                if not has_complained:
+                    self.complain(rc, f"did not confirm its disconnection from {arc}", error)
+                has_complained = True
                 does_not_obey = isinstance(error, Refusal)  # its hardware stops by itself if at all
             is_late = free_by_s < math.inf and (does_not_obey or self._real_s(free_by_s) < ASK_AGAIN_S)
             if is_late and self._may_leave(rc, arc):
@@ -215,10 +226,6 @@ class ContextSwitch:
     def _real_s(self, until_s: float) -> float:
         """Return the seconds until then on the machine's clock."""
         return (until_s - self._clock.now_s()) / self._clock.rate
-
-
-def _keep_quiet(_subject: str, _what: str) -> None:
-    """Do nothing: the event was noted already."""
 
 
 def _holds(arc: str, epochs: Mapping[str, int]) -> list[Hold]:

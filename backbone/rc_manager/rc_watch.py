@@ -14,7 +14,7 @@ from typing import Protocol
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import LogLevel, NameTaken
+from backbone.component.messages import Absence, LogLevel, NameTaken
 from backbone.component.story import StoryBook
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
@@ -53,6 +53,9 @@ class Service(Protocol):
     def is_choosing(self) -> bool:
         """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
 
+    def changed(self) -> None:
+        """Publish news soon."""
+
     def publish_event(self, subject: str, what: str, level: LogLevel) -> None:
         """Publish an event about the subject to the mission's log."""
 
@@ -85,6 +88,7 @@ class RcWatch:
         self._pauses_s: dict[str, float] = {}
         self._meeting: Counter[str] = Counter()
         self._faults: dict[str, str] = {}
+        self._failing_since_s: dict[str, float] = {}
         self._doubted: set[str] = set()
         self._starts: dict[str, asyncio.Task[None]] = {}
 
@@ -92,6 +96,15 @@ class RcWatch:
     def starts(self) -> list[asyncio.Task[None]]:
         """The running starts through the placer."""
         return [*self._starts.values()]
+
+    def absences(self) -> list[Absence]:
+        """Return the RCs that run and cannot be used: put aside, unsafe, silent, or connected in vain."""
+        used = {lease.rc for lease in self._service.manager.leases()} if self._failing_since_s else set()
+        return [
+            Absence(rc, since_s, self._why(rc), "the RC manager tries it again", _remedy(rc), is_running=True)
+            for rc, since_s in sorted(self._failing_since_s.items())
+            if rc not in self.up or rc in used
+        ]
 
     def missing(self) -> list[str]:
         """Return the RCs that do not run, sorted."""
@@ -128,6 +141,8 @@ class RcWatch:
             if self._faults.pop(rc, ""):
                 self._service.story.note(rc, "is credible again")
             self.up.add(rc)
+            if rc not in self._pauses_s:
+                self._failing_since_s.pop(rc, None)
             self._service.happened(RcCameBack(rc, state.last_epoch))
             if state.capacity != self.resources[rc].capacity:
                 self._service.happened(CapacityChanged(rc, state.capacity))
@@ -152,6 +167,8 @@ class RcWatch:
 
         Each retry may preempt holders of other RCs, so the wait doubles with each further connection in vain.
         """
+        self._failing_since_s.setdefault(rc, self._service.clock.now_s())
+        self._service.changed()
         if rc not in self._failing:
             self._failing.add(rc)
             self._service.start_task(self._meet_later(rc, self._pauses_s.get(rc, MEET_AGAIN_S)), f"meet {rc}")
@@ -160,6 +177,7 @@ class RcWatch:
         """Note that these RCs were connected."""
         for rc in rcs:
             self._pauses_s.pop(rc, None)
+            self._failing_since_s.pop(rc, None)
 
     def failed(self, rc: str) -> None:
         """Count the RC as down after a connection in vain; the caller informs the schedule manager."""
@@ -171,6 +189,7 @@ class RcWatch:
         was_known = rc in self.up or bool(self._faults.pop(rc, ""))
         self.up.discard(rc)
         self._pauses_s.pop(rc, None)  # its next process may be sound
+        self._failing_since_s.pop(rc, None)
         return was_known
 
     def does_not_answer(self, rc: str) -> None:
@@ -226,6 +245,12 @@ class RcWatch:
                 await clock.sleep_s(MEET_AGAIN_S * clock.rate)
         finally:
             self._failing.discard(rc)
+            if rc not in self.up:
+                self._failing_since_s.pop(rc, None)
+
+    def _why(self, rc: str) -> str:
+        fault = self._faults.get(rc)
+        return f"it is put aside: {fault}" if fault else self._context_switch.complaint(rc)
 
     async def _ask(self, rc: str, given: int | None = None) -> RcState | None:
         """Return the RC's own report of its state; None if it does not answer, or is not credible and put aside."""
@@ -239,6 +264,7 @@ class RcWatch:
             return None
         except (Refusal, LinkError) as error:
             log.warning("%s did not answer with its state: %s", rc, error)
+            self._context_switch.complain(rc, "did not answer with its state", error)
             return None
         fault = contradiction(state, resource, clock.now_s(), given)
         if fault:
@@ -263,3 +289,7 @@ class RcWatch:
             self._service.publish_event(rc, f"is put aside: {fault}", LogLevel.WARNING)
             self._service.happened(RcWentDown(rc, fault))
         self.meet_in_a_while(rc)
+
+
+def _remedy(rc: str) -> str:
+    return f"examine its hardware; 'scout-backbone story {rc}' shows its failures"

@@ -19,7 +19,7 @@ from backbone.addresses import DEPENDENCY_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import CALM_S, Component
 from backbone.component.launch import Launch
-from backbone.component.messages import LogLevel
+from backbone.component.messages import Absence, LogLevel
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
@@ -161,6 +161,10 @@ class RcManager(Component[RcManagerParameters]):
     def statistics(self) -> dict[str, float]:
         """Count decisions and switches; switch times are from revoke to grant, settling not counted."""
         return {**self._switches.statistics(), "held": float(len(self.manager.leases()))}
+
+    def absences(self) -> list[Absence]:
+        """Return RCs that cannot be used, and ARCs that want time and cannot run."""
+        return [*self._rcs.absences(), *self._switches.absences(self.answers.unservable())]
 
     # ------------------------------------------------------------------ questions
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -383,15 +387,11 @@ class RcManager(Component[RcManagerParameters]):
 
     def publish_news(self) -> None:
         """Publish the schedule, if a component may hear it, and, if it has changed, the number of ARCs that run."""
-        arcs = self.manager.master_schedule.state.arcs
+        arcs, no_trace = self.manager.master_schedule.state.arcs, self._log.why_no_trace
         self._lines_published = len(arcs)
         running = sum(1 for arc in arcs.values() if arc.state is RequestState.RUNNING)
-        feedback = f"{running} of {len(arcs)} ARCs run"
-        if self._log.why_no_trace:
-            feedback += f"; {self._log.why_no_trace}"
-        if feedback != self.feedback:
-            self.feedback = feedback
-            super().publish_news()
+        self.feedback = f"{running} of {len(arcs)} ARCs run{f'; {no_trace}' if no_trace else ''}"
+        super().publish_news()
         if not self.bus.is_unheard(Conversation.SCHEDULE):
             self.bus.publish(self.address, Conversation.SCHEDULE, self.answers.schedule(self.clock.now_s()))
 

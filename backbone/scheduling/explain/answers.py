@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection
+from typing import NamedTuple
 
 import msgspec
 
@@ -14,6 +15,7 @@ from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.events import Freed, Opened
 from backbone.scheduling.explain.attributes import attributes
 from backbone.scheduling.explain.explanation import Explanation
+from backbone.scheduling.explain.packet_lines import never_served, packet_lines
 from backbone.scheduling.explain.start_prediction import Foreseen
 from backbone.scheduling.rehearsal import Rehearsal
 from backbone.scheduling.requests import RequestState, Scheduled, UnknownRequest
@@ -23,6 +25,20 @@ from backbone.scheduling.views import Attributes, Schedule, Why
 FORESEEN_S = 300.0  # chosen: a start later than in five minutes is no answer to an operator
 FORESEEN_LINES = 1000  # chosen: some two hundred slices
 FORESEEN_WORK = 250_000  # measured: lines × ARCs², of which 32 ARCs take 0.1 s, or 0.25 s under discipline ``time``
+
+
+class Unservable(NamedTuple):
+    """A waiting ARC that sharable RCs could not serve even alone.
+
+    Attributes:
+        since_s: Mission time since which it waits.
+        until: The event that would let it run.
+    """
+
+    arc: str
+    since_s: float
+    why: str
+    until: str
 
 
 class Answers:
@@ -60,6 +76,16 @@ class Answers:
         """
         at_s = self._not_before(now_s)
         return msgspec.structs.replace(self._explanation.why(name, at_s), at_s=at_s)
+
+    def unservable(self) -> list[Unservable]:
+        """Return the waiting ARCs that sharable RCs could not serve even alone."""
+        rcs, usable = self._state.rcs, self._manager.master_schedule.table.usable
+        waiting = (arc for arc in self._state.arcs.values() if arc.state is RequestState.WAITING and not usable(arc))
+        never = {arc: never_served(arc, self._state) for arc in waiting if all(rcs[rc].up for rc in arc.uses)}
+        return [
+            Unservable(arc.name, arc.since_s, "; ".join([why, *packet_lines(arc)]), until)
+            for arc, (why, until) in never.items()
+        ]
 
     def attributes(self, name: str) -> Attributes:
         """Return the requests of an ARC, of an owner (name or address), or of a node and its descendants.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from backbone.naming import component_of
 from backbone.scheduling.entries import INSTANT_S, ArcEntry, RcEntry
 from backbone.scheduling.explain.blockers import Blockers
-from backbone.scheduling.explain.packet_lines import packet_lines
+from backbone.scheduling.explain.packet_lines import never_served, packet_lines
 from backbone.scheduling.explain.start_prediction import Foreseen, StartPrediction
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.planner import Slot
@@ -278,11 +278,8 @@ class Explanation:
             reason = "; ".join([f"{age} for {', '.join(down)}, not up", *faults])
             return _Answer([reason], "11", f"{', '.join(down)} answers")
         if slot is None or not self._table.usable(arc):
-            crowded = ", ".join(rc for rc in arc.uses if self._state.rcs[rc].sharable)
-            until = f"the capacity of {crowded} grows"
-            if packet_lines(arc):  # measured times are forgotten when the ARC ends
-                until = f"its owner claims anew, with a longer period or once {crowded} is faster"
-            return _Answer([f"{age}: {crowded} could not serve it even alone"], "11", until)
+            what, until = never_served(arc, self._state)
+            return _Answer([f"{age}: {what}"], "11", until)
         if not blockers:
             return _Answer([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
         whom = _names(blockers)

@@ -17,6 +17,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.dependency_database.messages import Resource
 from backbone.dependency_database.service import DependencyDatabase
+from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import (
@@ -115,6 +116,7 @@ class PlainArc(Component[Any]):
         self.log: list[tuple[str, str, float]] = []
         self.beats = True
         self.hangs = False
+        self.cannot_open: Refusal | None = None
 
     async def serve(self) -> None:
         while True:
@@ -132,6 +134,8 @@ class PlainArc(Component[Any]):
         if self.hangs:
             await self.clock.sleep_s(60.0)
         match asked.body:
+            case OpenGate() if self.cannot_open is not None:
+                raise self.cannot_open
             case OpenGate(epochs=epochs, settled_s=settled_s):
                 await self.clock.sleep_until_s(settled_s)
                 self.epochs, self.granted_s = epochs, self.clock.now_s()

@@ -94,3 +94,12 @@ def test_nothing_that_a_console_hears_commands_its_terminal(text: str) -> None:
     view = model(event).view(6.0)
     assert head(view, 400, Profile.MONITOR, 4.0).status.plain.isprintable()
     assert event_json(event).decode().isprintable()
+
+
+def test_a_component_that_runs_and_does_not_work_is_not_called_absent() -> None:
+    radio = Absence("radio", 4.0, "its antenna is off", "the RC manager tries it again", is_running=True)
+    shown = model(heard(5.0, HealthWord.DEGRADED, radio))
+    assert absent(shown, 6.0)["radio"].line == "radio does not work: its antenna is off; the RC manager tries it again"
+    health = shown.view(6.0).health
+    assert health is not None
+    assert health.lines == ["radio has not worked for 2.0 s: its antenna is off; the RC manager tries it again"]

@@ -7,6 +7,7 @@ export interface Absence {
   doing: string;
   remedy: string;
   vital: boolean;
+  is_running: boolean;
 }
 
 export type AlarmKind =

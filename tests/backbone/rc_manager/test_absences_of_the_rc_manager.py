@@ -1,0 +1,113 @@
+"""The RC manager names RCs that run and cannot be used, and ARCs that want time and cannot run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rc_manager_at_work import request
+
+from backbone.addresses import RC_MANAGER
+from backbone.bus.clock import run_virtual
+from backbone.component.messages import Absence, AskState, ComponentState
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from backbone.rc_manager.messages import RcState
+from backbone.rc_manager.rc_watch import MEET_LATEST_S
+from backbone.scheduling.requests import LEASE_S
+
+
+class NotReady(Refusal):
+    """An ARC cannot tune its receiver."""
+
+    code = "test.not_ready"
+    remedy = ""
+
+
+async def _absent(of: Any) -> dict[str, Absence]:
+    state = await of.bus.ask(RC_MANAGER, AskState(), ComponentState, within_s=1)
+    return {absence.name: absence for absence in state.absent}
+
+
+def test_an_rc_whose_hardware_is_not_safe_is_named_until_it_is(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            holder = await here.arc("holder")
+            await holder.ask_for(request("holder", "left"))
+            await here.clock.sleep_s(1.0)
+            assert not await _absent(holder)
+            here.rcs["left"].does_not_obey = True
+            await holder.ask_for(request("holder", "right"))
+            await here.clock.sleep_s(2 * LEASE_S)
+            absence = (await _absent(holder))["left"]
+            assert absence.is_running
+            assert absence.doing
+            assert "left is not safe" in absence.cause
+            here.rcs["left"].does_not_obey = False
+            await here.clock.sleep_s(2 * LEASE_S)
+            assert not await _absent(holder)
+
+    run_virtual(main())
+
+
+def test_an_rc_that_is_connected_in_vain_is_named_until_it_is_connected(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            holder = await here.arc("holder")
+            here.rcs["left"].is_broken = True
+            await holder.ask_for(request("holder", "left"))
+            for _ in range(40):
+                await here.clock.sleep_s(0.25)
+                assert "left is broken" in (await _absent(holder))["left"].cause
+            here.rcs["left"].is_broken = False
+            await here.clock.sleep_s(MEET_LATEST_S)
+            assert not await _absent(holder)
+
+    run_virtual(main())
+
+
+def test_an_rc_that_does_not_answer_is_named(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            asker = await here.arc("asker")
+            here.rcs["left"].hangs = True
+            here.rcs["left"].changed()
+            await asker.ask_for(request("asker", "left"))
+            await here.clock.sleep_s(3.0)
+            assert (await _absent(asker))["left"].cause
+
+    run_virtual(main())
+
+
+def test_an_arc_that_opens_in_vain_is_named_while_it_wants_time(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            odd = await here.arc("odd")
+            odd.cannot_open = NotReady("odd could not be prepared: no picture")
+            await odd.ask_for(request("odd", "left"))
+            for _ in range(20):
+                await here.clock.sleep_s(0.25)
+                assert "no picture" in (await _absent(odd))["odd"].cause
+            odd.cannot_open = None
+            await here.clock.sleep_s(20.0)
+            assert odd.is_open
+            assert not await _absent(odd)
+
+    run_virtual(main())
+
+
+def test_an_arc_that_the_radio_could_not_serve_even_alone_is_named(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            fast = await here.arc("fast")
+            await fast.ask_for(request("fast", "radio"))
+            await here.clock.sleep_s(1.0)
+            assert not await _absent(fast)
+            radio = here.rcs["radio"]
+            state = RcState("radio", "command_radio", True, 0.001, [], radio.last_epoch, 0, 0)
+            radio.bus.publish(radio.address, Conversation.TELEMETRY, state)
+            await here.clock.sleep_s(1.0)
+            absence = (await _absent(fast))["fast"]
+            assert absence.cause == "radio could not serve it even alone"
+            assert absence.doing == "waits until the capacity of radio grows"
+
+    run_virtual(main())
