@@ -18,7 +18,7 @@ Rules:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import msgspec
@@ -81,14 +81,24 @@ class Registry:
         reconnect_s: Mission seconds after that in which components of an earlier hub may reconnect; 0 without an
             earlier hub.
         claim_within_s: Mission seconds for which a name is kept until its holder declares its claim.
+        stops: Emergency stops that an earlier hub knew, by the name of the stopped component.
+        otherwise: Stop of each component whose state no hub knows; None: it is not stopped.
     """
 
-    def __init__(self, hub_since_s: float, reconnect_s: float, claim_within_s: float = CLAIM_WITHIN_S) -> None:
+    def __init__(
+        self,
+        hub_since_s: float,
+        reconnect_s: float,
+        claim_within_s: float = CLAIM_WITHIN_S,
+        stops: Mapping[str, StandingStop] | None = None,
+        otherwise: StandingStop | None = None,
+    ) -> None:
         self._claim_within_s = claim_within_s
         self._hub_since_s, self._complete_from_s = hub_since_s, hub_since_s + reconnect_s
         self._entries: dict[str, _Entry] = {}
         self._introducing: set[str] = set()
-        self._stops: dict[str, StandingStop] = {}
+        self._stops: dict[str, StandingStop | None] = {**(stops or {})}
+        self._otherwise = otherwise
 
     # ------------------------------------------------------------------ events
     def registered(self, newcomer: ComponentState, now_s: float) -> None:
@@ -169,7 +179,11 @@ class Registry:
     # ------------------------------------------------------------------ questions
     def stop_of(self, name: str) -> StandingStop | None:
         """Return the emergency stop in force on the component of this name, or on its last one."""
-        return self._stops.get(name)
+        return self._stops.get(name, self._otherwise)
+
+    def stops(self) -> dict[str, StandingStop]:
+        """Return the emergency stops in force, by the name of the stopped component."""
+        return {name: stop for name, stop in self._stops.items() if stop is not None}
 
     def is_unknown(self, address: str) -> bool:
         """Return whether a token exists at this address without a known component."""
@@ -216,10 +230,7 @@ class Registry:
     # ------------------------------------------------------------------
     def _record(self, entry: _Entry, state: ComponentState) -> None:
         entry.state, name = state, component_of(state.address)
-        if state.stop is not None:
-            self._stops[name] = state.stop  # kept after its end, because the next one may start on another host
-        else:
-            self._stops.pop(name, None)
+        self._stops[name] = state.stop  # kept after its end, because the next one may start on another host
 
     def _token_fell(self, name: str, address: str, now_s: float) -> list[Instruction]:
         self._introducing.discard(address)

@@ -5,7 +5,8 @@ detects every death within milliseconds.
 
 The first hub of a mission has no predecessor whose components could reconnect, so its lists are complete at once and
 the bring-up need not wait. It writes a file into the run directory, from which the next hub learns that it is not the
-first.
+first. A second file keeps the emergency stops: if a stopped robot's RC and the hub end together, the robot's next RC
+still learns of its stop from the next hub.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.bus.zenoh_threads import threads_of_a_hub
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import AskState, ComponentState, NameTaken, Register, Registered
+from backbone.component.messages import AskState, ComponentState, LogLevel, NameTaken, Register, Registered
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import (
@@ -36,6 +37,7 @@ from backbone.nameserver.messages import (
     Resolved,
 )
 from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Instruction, Introduce, Registry
+from backbone.nameserver.stops_file import UNREADABLE, StopsFile
 from backbone.naming import IllegalName, component_of, is_component, read_claim
 from backbone.wire import Envelope, Message
 
@@ -89,7 +91,10 @@ class Nameserver(Component[NameserverParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         reconnect_s = 0.0 if _is_first(launch) else RECONNECT_S * clock.rate
-        self._registry = Registry(clock.now_s(), reconnect_s, CLAIM_WITHIN_S * clock.rate)
+        self._stops_file = StopsFile(launch.run_directory)
+        stops = self._stops_file.read()
+        otherwise = UNREADABLE if stops is None else None
+        self._registry = Registry(clock.now_s(), reconnect_s, CLAIM_WITHIN_S * clock.rate, stops, otherwise)
         self._to_introduce: asyncio.Queue[str] = asyncio.Queue()
         self._registrations = self._refusals = self._appeared = self._disappeared = self._unanswered = 0
 
@@ -167,6 +172,15 @@ class Nameserver(Component[NameserverParameters]):
 
     def _status_published(self, heard: Envelope[ComponentState]) -> None:
         self._registry.status_published(heard.body)
+        self._keep_stops()
+
+    def _keep_stops(self) -> None:
+        """Save the stops for the next hub; a write error ends no hub."""
+        try:
+            self._stops_file.keep(self._registry.stops())
+        except OSError as error:
+            lost = f"a restart of the hub will not know which robots are stopped: {error.strerror}"
+            self.publish_event(self.name, lost, LogLevel.WARNING)
 
     def _carry_out(self, instructions: list[Instruction]) -> None:
         for instruction in instructions:
@@ -205,6 +219,7 @@ class Nameserver(Component[NameserverParameters]):
                 return
             else:
                 self._carry_out(self._registry.introduced(state))
+                self._keep_stops()
                 return
             self._registry.introduction_failed(address)
             if not self._registry.is_unknown(address):
