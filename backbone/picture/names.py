@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from backbone.component.messages import LifeState
 from backbone.component_database.messages import TypeCount
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.mission.model import EXECUTION_UNIT
@@ -12,10 +13,17 @@ from backbone.naming import Subsystem, component_of
 from backbone.picture.mission import MissionPicture
 from backbone.run_names import MissionNames
 
+_LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
+
 
 def names_in(picture: MissionPicture, types: Iterable[TypeCount] = ()) -> MissionNames:
-    """Return the names in a picture and of these types; a person's name only if it is one word for a shell."""
-    components, schedule = picture.components, picture.schedule
+    """Return the names in a picture and of these types, without components that leave or left.
+
+    The news that a component has left may come before the last news of the component itself, which would stay. A
+    person's name is left out if it is more than one word for a shell.
+    """
+    components = {at: one for at, one in picture.components.items() if one.state not in _LEAVING}
+    schedule = picture.schedule
     rcs = schedule.rcs if schedule is not None else []
     requests = schedule.requests if schedule is not None else []
     found = {component_of(at) for at in components}

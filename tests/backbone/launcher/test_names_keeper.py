@@ -17,7 +17,7 @@ from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.launcher.names_keeper import LIST_AGAIN_S, NamesKeeper
+from backbone.launcher.names_keeper import NamesKeeper
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskSchedule
 from backbone.run_files import RunFile
@@ -63,7 +63,7 @@ def test_the_file_follows_what_comes_and_goes(local_mission: Any, beside: Callab
                 await clock.sleep_s(2.0)
                 assert {"watch1", "scout1"} <= set(written().all)
                 assert (written().robots, written().behaviors) == (["scout1"], ["watch1"])
-            await clock.sleep_s(LIST_AGAIN_S + 2.0)
+            await clock.sleep_s(2.0)
             assert written().behaviors == []
             assert len(asked) <= 4, "the RC manager is asked after components came and went, and now and then"
             await end_tasks(keeping)
