@@ -19,6 +19,7 @@ from backbone.component.component import Component
 from backbone.component.heartbeat import read_vitals
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LogLevel
+from backbone.component.recurring import CALM_S, Recurring
 from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import (
     AlreadyHere,
@@ -97,6 +98,7 @@ class Creator(Component[CreatorParameters]):
         self._read_vitals = read_vitals
         self._load = (0.0, 0.0, 1)
         self._spawned = self._ended = self._fell = 0
+        self._silences = Recurring(CALM_S * clock.rate)
 
     async def connect(self) -> None:
         """Watch liveliness tokens; spawn a zygote if this process could not fork one."""
@@ -187,6 +189,7 @@ class Creator(Component[CreatorParameters]):
 
     async def _spawn(self, order: Spawn) -> Spawned:
         self._refuse_unlisted(order)
+        self._silences.forget(order.name)
         launch = msgspec.structs.replace(
             self.launch,
             subsystem=order.subsystem,
@@ -213,14 +216,24 @@ class Creator(Component[CreatorParameters]):
 
     def _component_fell(self, fell: ProcessFell) -> None:
         self._fell += 1
+        self._silences.forget(fell.name)
         then = f"restarts in {fell.restart_in_s:.2g} s" if fell.restart_in_s >= 0 else "its owner asks for another one"
         self.publish_event(fell.name, f"fell, {fell.how}; {then}", LogLevel.WARNING)
         self.bus.publish(self.address, Conversation.EVENTS, fell)
 
     def _component_silent(self, name: str, silent_s: float) -> None:
-        said = f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again"
-        self.publish_event(name, said, LogLevel.WARNING)
+        if not silent_s:
+            over_s = self._silences.goes(name, self.clock.now_s())
+            self.start_task(self._say_who_responds(over_s), "say who responds again")
+        elif self._silences.comes(name):
+            self.publish_event(name, f"shows no sign of life for {silent_s:.1f} s", LogLevel.WARNING)
         self._processes_changed()
+
+    async def _say_who_responds(self, over_s: float) -> None:
+        await self.clock.sleep_until_s(over_s)
+        for name, count in self._silences.over(over_s).items():
+            times = f", after {count} silences" if count > 1 else ""
+            self.publish_event(name, f"responds again{times}", LogLevel.WARNING)
 
     def _processes_changed(self) -> None:
         self._publish_load()

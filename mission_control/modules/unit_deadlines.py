@@ -1,4 +1,4 @@
-"""The deadlines of a unit's sources: publishes one event when values are late, and one when they arrive again."""
+"""The deadlines of a unit's sources: publishes one event when values are late, and one when they come in time again."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 
 from backbone.component.component import Component
 from backbone.component.messages import DEADLINES_MISSED, LogLevel
+from backbone.component.recurring import CALM_S, Recurring
 from backbone.deadlines import Deadlines
 from backbone.ranges import LONGEST_MENTION
 from mission_control.modules.orders import UnitParameters
@@ -33,6 +34,7 @@ class UnitDeadlines:
         self._within_s = {key: qualities[key].deadline_s for key in keys if key in qualities}
         self._within_s = {key: within_s for key, within_s in self._within_s.items() if within_s}
         self._deadlines = Deadlines(self._within_s, component.clock.now_s())
+        self._recurring, self._late_s = Recurring(CALM_S * component.clock.rate), dict[str, float]()
 
     @property
     def text(self) -> str:
@@ -44,20 +46,27 @@ class UnitDeadlines:
         """Record the arrival of a value."""
         late_s = self._deadlines.came(key, self._component.clock.now_s())
         if late_s is not None:
-            self._component.publish_event(key, f"comes again, {late_s:.3f} s late", LogLevel.NOTICE)
+            self._late_s[key] = late_s
+            self._recurring.goes(key, self._component.clock.now_s())
             self._changed()
 
     async def watch(self) -> None:
-        """Publish an event as soon as a key is late; return if there are no deadlines."""
+        """Publish an event as soon as a key is late, and when it is in time again; return if there are no deadlines."""
         clock = self._component.clock
         while self._within_s:
             now_s = clock.now_s()
             for key in self._deadlines.newly_missed(now_s):
-                told = f"no value from {self._sources[key].address} within {self._within_s[key]:g} s"
-                self._component.publish_event(key, told, LogLevel.WARNING)
+                if self._recurring.comes(key):
+                    told = f"no value from {self._sources[key].address} within {self._within_s[key]:g} s"
+                    self._component.publish_event(key, told, LogLevel.WARNING)
                 self._changed()
+            for key, count in self._recurring.over(now_s).items():
+                said = f"comes again, {self._late_s[key]:.3f} s late"
+                if count > 1:
+                    said = f"comes in time again; it was late {count} times, the last time by {self._late_s[key]:.3f} s"
+                self._component.publish_event(key, said, LogLevel.NOTICE)
             pause_s = max(LEAST_PAUSE_S * clock.rate, min(self._within_s.values()))  # for late keys that arrive again
-            await clock.sleep_until_s(min(self._deadlines.next_s, now_s + pause_s))
+            await clock.sleep_until_s(min(self._deadlines.next_s, self._recurring.next_s, now_s + pause_s))
 
     def statistics(self) -> dict[str, float]:
         """Return the number of misses of each deadline, by the key on the bus."""
