@@ -27,24 +27,32 @@ def class_faults(kind: type) -> Iterator[str]:
     for name in dir(kind):
         definitions = [vars(one)[name] for one in kind.__mro__ if name in vars(one)]
         own, base = definitions[0], definitions[-1]
-        if own is not base and not name.startswith("__") and inspect.isfunction(own) and inspect.isfunction(base):
-            yield from _of_override(name, own, base)
+        if own is not base and not name.startswith("__"):
+            yield from fault_of_method(name, own, base, "the base class")
     yield from _of_constructors(kind)
     yield from _of_parameters(kind)
 
 
-def _of_override(name: str, own: typing.Any, base: typing.Any) -> Iterator[str]:
+def fault_of_method(name: str, own: typing.Any, base: typing.Any, whose: str) -> Iterator[str]:
+    """Yield a sentence if a call that suits the method ``base`` does not suit ``own``; other attributes have no fault.
+
+    Args:
+        whose: The class of ``base``, for people.
+    """
+    if not (inspect.isfunction(own) and inspect.isfunction(base)):
+        return
     if _can_be_awaited(base) and not _can_be_awaited(own):
-        yield f"{name} is a 'def'; write it as an 'async def', as the base class does"
+        yield f"{name} is a 'def'; write it as an 'async def', as {whose} does"
     elif _can_be_awaited(own) and not _can_be_awaited(base):
-        yield f"{name} is an 'async def'; write it as a 'def', as the base class does"
+        yield f"{name} is an 'async def'; write it as a 'def', as {whose} does"
     else:
         given = inspect.signature(base).parameters.values()
         by_place = [one.name for one in given if one.kind is one.POSITIONAL_OR_KEYWORD and one.default is one.empty]
+        by_name = [one.name for one in given if one.kind is one.KEYWORD_ONLY]
         try:
-            inspect.signature(own).bind(*by_place)
+            inspect.signature(own).bind(*by_place, **dict.fromkeys(by_name))
         except TypeError as error:
-            yield f"{name}: {error}; the base class has {name}({', '.join(by_place)})"
+            yield f"{name}: {error}; {whose} has {name}({', '.join(by_place + [f'{one}=…' for one in by_name])})"
 
 
 def _can_be_awaited(function: typing.Any) -> bool:

@@ -10,14 +10,15 @@ import asyncio
 import importlib
 import inspect
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar, runtime_checkable
+from typing import Annotated, Any, Protocol, TypeVar, cast, runtime_checkable
 
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.class_faults import fault_of_method
 from backbone.component.messages import WrongParameter
 from backbone.errors import Refusal
 from backbone.ranges import Share
@@ -267,7 +268,7 @@ def driver_class(path: str, resource: str, protocol: type = object) -> Callable[
     """Return the class at ``package.module:Class``; imports its file.
 
     Raises:
-        UnknownDriver: There is no such class, or it lacks methods of this protocol, or has async ones instead.
+        UnknownDriver: There is no such class, or its constructor or methods are not those of this protocol.
     """
     module_name, _, class_name = path.partition(":")
     try:
@@ -279,14 +280,20 @@ def driver_class(path: str, resource: str, protocol: type = object) -> Callable[
     is_judged = isinstance(found, type) and not hasattr(found, "__getattr__")  # which may pass calls on to another
     if is_judged and (lacking := methods_of(protocol) - methods_of(found)):
         raise UnknownDriver(f"{resource}: {path} lacks {', '.join(sorted(lacking))}")
-    called_at_once = methods_of(protocol) - _waiting_of(protocol) | methods_of(AdjustableDriver)
-    if is_judged and (waiting := sorted(_waiting_of(found) & called_at_once)):
-        raise UnknownDriver(f"{resource}: {path} has async {', '.join(waiting)}, which its RC calls without await")
+    if is_judged and (faults := [*_faults_of(cast(type, found), protocol)]):
+        raise UnknownDriver(f"{resource}: {path}: {'; '.join(faults)}")
     return found
 
 
-def _waiting_of(kind: object) -> set[str]:
-    return {name for name in methods_of(kind) if inspect.iscoroutinefunction(getattr(kind, name))}
+def _faults_of(driver: type, protocol: type) -> Iterator[str]:
+    """Yield a sentence for each call of the RC that does not suit the driver, whose methods are all there."""
+    try:
+        inspect.signature(driver).bind("site")
+    except TypeError as error:
+        yield f"{error}; its constructor gets one argument, the DriverSite"
+    for kind in (protocol, AdjustableDriver):  # an RC adjusts each driver that can be adjusted
+        for name in sorted(methods_of(kind) & methods_of(driver)):
+            yield from fault_of_method(name, getattr(driver, name), getattr(kind, name), kind.__name__)
 
 
 def methods_of(driver: object) -> set[str]:

@@ -18,9 +18,16 @@ class Options(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     port: str
 class Whole:
     options_type = Options
+    def __init__(self, site): ...
     async def open(self): ...
     async def transmit(self, network_id, payload, **named): ...
     async def close(self): ...
+class Bare(Whole):
+    def __init__(self): ...
+class Plain(Whole):
+    def close(self): ...
+class Old(Whole):
+    async def transmit(self, network_id, payload, *, arc, robot_epoch): ...
 class Half:
     async def open(self): ...
     async def transmit(self, network_id, payload, **named): ...
@@ -45,6 +52,25 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (RADIO, "own_rdio:Whole", "own_rdio:Whole: no module own_rdio"),
         (RADIO, "own_radio:Whle", "own_radio:Whle: no class Whle in own_radio (did you mean 'Whole'?)"),
         (RADIO, "own_radio:Half", "radio cannot use this driver: radio driver: own_radio:Half lacks close"),
+        (
+            RADIO,
+            "own_radio:Bare",
+            "radio cannot use this driver: radio driver: own_radio:Bare: too many positional arguments; "
+            "its constructor gets one argument, the DriverSite",
+        ),
+        (
+            RADIO,
+            "own_radio:Plain",
+            "radio cannot use this driver: radio driver: own_radio:Plain: close is a 'def'; "
+            "write it as an 'async def', as RadioDriver does",
+        ),
+        (
+            RADIO,
+            "own_radio:Old",
+            "radio cannot use this driver: radio driver: own_radio:Old: transmit: "
+            "got an unexpected keyword argument 'robot_stop'; RadioDriver has "
+            "transmit(self, network_id, payload, arc=…, robot_epoch=…, robot_stop=…)",
+        ),
         (RADIO, "own_radio:NONE", "radio cannot use this driver: radio driver: own_radio:NONE is no class"),
         (
             RADIO,
