@@ -153,10 +153,13 @@ def check_driver(resource: Element, tables: Tables, report: Report) -> None:
     by_class = any(one.name == facts.driver_field and one.schema.get("default") for one in facts.parameters)
     is_unused = given is resource and (by_class or not is_legal(driver))  # the schema refuses an illegal name
     if driver not in facts.options and not is_unused:
+        is_parameter = given is resource and facts.driver_field != "driver"
+        how = f'<parameter name="{facts.driver_field}" value="package.module:Class"/>'
         report.fault(
             given.place_of(attribute),
             f"{resource.text('type')} has no driver {quoted(driver)}{report.hint(driver, facts.options)}",
-            f"Write a driver's class as package.module:Class; built in: {listed(facts.options) or 'none'}",
+            (f"Add {how}" if is_parameter else "Write a driver's class as package.module:Class")
+            + f"; built in: {listed(facts.options) or 'none'}",
         )
 
 

@@ -333,13 +333,16 @@ async def open_device(driver: RadioDriver | FramegrabberDriver, resource: str) -
 
 
 def options_of_drivers(kind: str, named: str = "", protocol: type = object) -> dict[str, type[msgspec.Struct]]:
-    """Return for each built-in driver of a kind, and for a named one, the struct of its options; imports their modules.
+    """Return for each built-in driver of a kind that has the protocol's methods, and for a named one, its options.
+
+    Imports their modules.
 
     Raises:
         UnknownDriver: No driver has this name, or it lacks methods of the protocol.
     """
     what = f"{kind} driver"
-    paths = {**BUILT_IN.get(kind, {}), **({named: driver_path(kind, named, what)} if named else {})}
-    return {
-        name: getattr(driver_class(path, what, protocol), "options_type", NoOptions) for name, path in paths.items()
-    }
+    found = {name: driver_class(path, what) for name, path in BUILT_IN.get(kind, {}).items()}
+    found = {name: one for name, one in found.items() if methods_of(protocol) <= methods_of(one)}
+    if named:
+        found[named] = driver_class(driver_path(kind, named, what), what, protocol)
+    return {name: getattr(one, "options_type", NoOptions) for name, one in found.items()}

@@ -46,6 +46,7 @@ class VideoCamera(RobotRc[RobotParameters]):
     """A camera with transmitter, reached through a command radio like a robot."""
 
     commands = Look | Halt | SwitchTransmitter
+    driver_protocol = PanProtocol
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {"pan_rad": (-MOST_PAN_RAD, MOST_PAN_RAD)}
     _protocol: PanProtocol
 

@@ -99,6 +99,31 @@ def test_a_robots_driver_is_the_one_in_its_parameter_protocol(own: Path) -> None
     assert scout("growth").splitlines()[fault.line - 1][fault.column - 1 :].startswith("value")
 
 
+@pytest.mark.parametrize(
+    ("path", "parameter"),
+    [
+        ("resource_pool.robots.rover.rc:RoverRc", 'protocol" value="resource_pool.robots.rover.rc:RoverProtocol'),
+        (
+            "resource_pool.devices.pan_camera.rc:VideoCamera",
+            'protocol" value="resource_pool.devices.pan_camera.rc:PanProtocol',
+        ),
+    ],
+)
+def test_a_robot_without_the_protocol_that_its_commands_need_is_refused(own: Path, path: str, parameter: str) -> None:
+    """Else its first command ends its RC."""
+
+    def mission(given: str) -> str:
+        cart_type = f'<type name="cart" class="{path}" subsystem="resource_pool" uses="command_radio"/>'
+        cart = f'<resource type="cart" name="cart1" driver="serial">{given}</resource>'
+        return changed(("  </types>", f"{cart_type}</types>"), ("  <resources>", f"<resources>{cart}"))
+
+    given = '<uses type="command_radio" name="radio"/><parameter name="network_id" value="9"/>'
+    [fault] = faults_in(own, mission(given))
+    assert fault.message == "cart has no driver 'serial'"
+    assert fault.remedy == 'Add <parameter name="protocol" value="package.module:Class"/>; built in: none'
+    read_text(own, mission(f'{given}<parameter name="{parameter}"/>'))
+
+
 def test_options_of_a_driver_of_ones_own_are_checked(own: Path) -> None:
     def radio(option: str) -> str:
         whole = f'{RADIO} driver="own_radio:Whole"'
