@@ -17,7 +17,7 @@ from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH
 from backbone.mission.document import Element
 from backbone.mission.module_checks import check_modules
-from backbone.mission.needs_checks import check_commands, check_needs, check_replaced
+from backbone.mission.needs_checks import check_commands, check_needs, check_replaced, check_roles
 from backbone.mission.parameter_checks import (
     check_class_parameters,
     check_class_path,
@@ -145,6 +145,7 @@ def _check_types(tables: Tables, report: Report) -> None:
         _check_core_type(component_type, report)
         if component_type.place != tables.root.place:
             check_needs(component_type, tables, report)
+            check_roles(component_type, tables, report)
             check_commands(component_type, tables, report)
             check_replaced(component_type, tables, report)
         _check_type_tags(component_type, tables, report)

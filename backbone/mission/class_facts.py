@@ -110,6 +110,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
         given: Parameters that other elements and attributes of the mission file set.
         shares_process: Whether the placer may put its components into a process with others.
         alike_most: Largest number of its components in one process; 1: they do not share one.
+        roles: Role → kind of RC in the set of an ARC; empty: it is no ARC.
     """
 
     doc: str = ""
@@ -125,6 +126,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     given: tuple[str, ...] = ()
     shares_process: bool = True
     alike_most: int = 1
+    roles: dict[str, str] = {}
 
     def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
         """Return all parameters that can be set while this driver is used; None if the driver is unknown."""

@@ -71,6 +71,7 @@ def _described(found: type[Component[Any]], driver: str) -> ClassFacts:
         abilities=found.abilities(),
         given=tuple(sorted(found.given_elsewhere)),
         shares_process=found.shares_process,
+        roles=getattr(found, "kinds", dict)(),
         alike_most=max(1, found.alike_most or (ALIKE_MOST if found.shares_process else 1)),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
@@ -55,6 +55,26 @@ def check_commands(component_type: Element, tables: Tables, report: Report) -> N
                     f"{component_type.text('name')} passes {command.word} on to its {role}, and no {kind} obeys it",
                     f"Declare it in commands of the class of {kind}, which obeys: {listed(obeyed) or 'nothing'}",
                 )
+
+
+def check_roles(component_type: Element, tables: Tables, report: Report) -> None:
+    """Report needs that are not the roles of the ARC's class: the class decides which RCs the ARC gets."""
+    name = component_type.text("name")
+    facts, needs = tables.facts_of(name), tables.needs(name)
+    if facts is not None and facts.roles and needs != facts.roles:
+        written = [
+            f'<needs type="{kind}"/>' if role == kind else f'<needs role="{role}" type="{kind}"/>'
+            for role, kind in facts.roles.items()
+        ]
+        report.fault(
+            component_type.place_of("class"),
+            f"type {name} needs {_in_words(needs)}, and its class {_in_words(facts.roles)}",
+            f"Write {''.join(written)}, or change roles of the class",
+        )
+
+
+def _in_words(needs: Mapping[str, str]) -> str:
+    return listed([kind if role == kind else f"{role} ({kind})" for role, kind in needs.items()]) or "nothing"
 
 
 def check_needs(component_type: Element, tables: Tables, report: Report) -> None:

@@ -67,3 +67,30 @@ def test_a_command_that_no_rc_of_its_role_obeys_is_refused_by_check(tmp_path: Pa
     [fault] = caught.value.faults
     assert fault.message == "own passes jump on to its lamp, and no lamp obeys it"
     assert fault.remedy == "Declare it in commands of the class of lamp, which obeys: shine"
+
+
+@pytest.mark.parametrize(
+    ("needs", "told"),
+    [
+        ('<needs type="scout"/>', "needs scout"),
+        ('<needs type="lamp"/><needs type="scout"/>', "needs lamp, scout"),
+        ('<needs role="light" type="lamp"/>', "needs light (lamp)"),
+    ],
+)
+def test_needs_that_are_not_the_roles_of_the_class_are_refused(tmp_path: Path, needs: str, told: str) -> None:
+    """The class decides which RCs the ARC gets; placement and rehearsal went by the file."""
+    file = tmp_path / "m.xml"
+    text = (
+        '<mission name="m" priority="1"><types>\n'
+        '<type name="lamp" class="resource_pool.rcs.skeleton:Lamp" subsystem="resource_pool"/>\n'
+        f'<type name="own" class="{__name__}:LampArc" subsystem="resource_pool">{needs}</type>\n'
+        '</types><resources><resource type="lamp" name="lamp1" driver="resource_pool.rcs.skeleton:PaintedLamp">'
+        '<parameter name="color" value="red"/></resource></resources></mission>'
+    )
+    file.write_text(text)
+    with pytest.raises(MissionInvalid) as caught:
+        read_mission(file)
+    [fault] = caught.value.faults
+    assert fault.message == f"type own {told}, and its class lamp"
+    assert fault.remedy == 'Write <needs type="lamp"/>, or change roles of the class'
+    assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith("class=")
