@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from backbone.addresses import NAMESERVER, RC_MANAGER
+from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.component.messages import AskParameters, Parameters, SetParameter
-from backbone.errors import Refusal
+from backbone.errors import LinkError, Refusal
+from backbone.launcher.messages import AskTree, Tree
+from backbone.mission.document import outline
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.naming import component_of
 from backbone.rc_manager.messages import AskAttributes, Done, MoveNode, SetPriority
@@ -135,12 +137,38 @@ async def change(bus: Bus, name: str, attribute: str, value: object, user: str) 
 async def _set_priority(bus: Bus, name: str, value: object) -> list[str]:
     if isinstance(value, bool) or not isinstance(value, int):
         raise WrongAttribute(f"the priority of {name} cannot be {value!r}", name=name)
+    await _require_known(bus, name)
     await bus.ask(RC_MANAGER, SetPriority(name, value), Done, within_s=REPLY_TIME_S)
     try:
         found = await bus.ask(RC_MANAGER, AskAttributes(name), Attributes, within_s=REPLY_TIME_S)
     except UnknownRequest:
         return [f"{name}: nothing at or below it asks for run time yet; when it does, its priority is {value}"]
     return [f"{name}: priority is {value}", *(f"  {one.arc} has {_path(one.path)}" for one in found.requests)]
+
+
+async def _require_known(bus: Bus, name: str) -> None:
+    """Return if an ARC asks for run time at or below this name, or a component or a behavior of the tree has it.
+
+    Raises:
+        UnknownName: Nothing has this name; the detail suggests the nearest name.
+    """
+    try:
+        await bus.ask(RC_MANAGER, AskAttributes(name), Attributes, within_s=REPLY_TIME_S)
+    except UnknownRequest:
+        try:
+            await _address(bus, name)
+        except UnknownName:
+            if name not in await _behaviors(bus):
+                raise
+
+
+async def _behaviors(bus: Bus) -> list[str]:
+    """Return the names of all behaviors of the present tree, running or not; none if the launcher does not answer."""
+    try:
+        tree = await bus.ask(LAUNCHER, AskTree(), Tree, within_s=REPLY_TIME_S)
+    except LinkError:
+        return []
+    return [one.text("name") for one in outline(tree.text.encode()) if one.tag == "behavior"]
 
 
 async def _move(bus: Bus, name: str, value: object) -> list[str]:

@@ -121,7 +121,8 @@ class CommonAnswers:
         if name in component.fixed:
             raise WrongParameter(
                 f"{component.launch.name} cannot change {name} while it runs",
-                remedy="Start it again with the new value: 'scout-backbone tree replace', or the mission file.",
+                remedy="Start it again with the new value: a behavior by 'scout-backbone tree replace', "
+                "a console by its options.",
             )
         component.change_parameters({name: value})
         component.story.note(name, f"{user} set {name} from {value_text(old[name])} to {value_text(value)}")

@@ -10,11 +10,12 @@ from typing import Any
 import pytest
 from pool_on_local_network import Owner, Pool, a_pool
 
-from backbone.addresses import RC_MANAGER
+from backbone.addresses import LAUNCHER, RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.command_line.attributes import WrongAttribute, attributes_of, change
 from backbone.component.messages import WrongParameter
 from backbone.keys import Conversation
+from backbone.launcher.messages import AskTree, Tree
 from backbone.nameserver.messages import UnknownName
 from backbone.rc_manager.messages import FixedRules, TraceLine
 from backbone.scheduling.requests import MissingRuntime, NotMovable, PathNode
@@ -189,11 +190,28 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing(play: Any) -> None:
     play(scene)
 
 
+def test_a_priority_of_a_behavior_of_the_tree_that_does_not_run_can_be_set(play: Any) -> None:
+    async def scene(pool: Pool, high: Owner, low: Owner) -> None:
+        async def answer(_asked: Any) -> Tree:
+            return Tree(1, '<mission><behaviors><behavior name="later"/></behaviors></mission>')
+
+        launcher = pool.network.join(LAUNCHER, pool.clock)
+        launcher.serve(LAUNCHER, AskTree, answer)
+        assert "its priority is 3" in (await set_(pool, "later", "priority", 3))[0]
+        with pytest.raises(UnknownName):
+            await set_(pool, "latter", "priority", 3)
+        await launcher.close()
+
+    play(scene)
+
+
 def test_a_priority_of_one_who_has_not_asked_yet_holds_when_it_does(play: Any) -> None:
     async def scene(pool: Pool, high: Owner, low: Owner) -> None:
+        with pytest.raises(UnknownName):
+            await set_(pool, "laet", "priority", 50)
+        late = await pool.owner("late")
         [told] = await set_(pool, "late", "priority", 50)
         assert "when it does" in told
-        late = await pool.owner("late")
         await pool.arc(late, "drive", "scout1", path=[PathNode("local", 10), PathNode("late", 1)])
         await pool.clock.sleep_s(0.5)
         assert late.heard() == ["Resumed"]

@@ -60,6 +60,7 @@ class Teleoperation(OrderVerbs):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
+    fixed: ClassVar[frozenset[str]] = frozenset({"robot", "kind", "sight", "away_after_s"})  # read when it begins
     accepts: ClassVar[Accepts | None] = ArcNotice | AskConsent | AskHandOver | AskLift | ChildReport
 
     def __init__(
