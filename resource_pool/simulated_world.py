@@ -28,12 +28,12 @@ from resource_pool.drivers.world_messages import (
 from resource_pool.floor_plans import plan_of
 from resource_pool.localization import AskFloorPlan, AskHome, AskPose, Pose
 from scout_model.air import antenna_m, distance_m
+from scout_model.composition import require_body
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.radio_air import RadioAir, Sent
 from scout_model.radio_link import packet_bits
-from scout_model.robot import robot_class
 from scout_model.world import World
 
 AWAY_S = 0.1  # chosen: three frames; together with the usual packet interval well below a robot's time-out
@@ -65,7 +65,7 @@ class SimulatedWorld(Component[WorldParameters]):
         """Return None, unless the named class of a body is refused."""
         if named:
             try:
-                robot_class(named)
+                require_body(named)
             except InvalidWorld as error:
                 raise NoSuchBody(str(error.args[0])) from error
 

@@ -304,6 +304,22 @@ def _add_landmark(spec: mujoco.MjSpec, landmark: Landmark) -> None:
         _part(body, name, _CYLINDER, [0.0, right_m, up_m], size_m, 0.05, _MARKS, quat=facing)
 
 
+def require_body(kind: str) -> None:
+    """Check that MuJoCo can build one robot of this kind.
+
+    Raises:
+        InvalidWorld: There is no such kind, or its body lacks a part or cannot be built.
+    """
+    spec, place = mujoco.MjSpec.from_string(_asset("room.xml")), RobotPlace("robot", 1, 1.0, 1.0, 0.0, kind)
+    _add_robot(spec, place, robot_class(kind).body_mjcf())
+    if spec.body("robot/body") is None or spec.joint("robot/free") is None:
+        raise InvalidWorld(f'the body of {kind} has no <body name="body"> with a <freejoint name="free"/>')
+    try:
+        spec.compile()
+    except ValueError as error:
+        raise InvalidWorld(f"the body of {kind} cannot be built: {' '.join(str(error).split())}") from error
+
+
 def _body_mjcf(place: RobotPlace) -> str:
     try:
         return robot_class(place.kind).body_mjcf()
@@ -317,7 +333,8 @@ def _add_robot(spec: mujoco.MjSpec, place: RobotPlace, body_mjcf: str) -> None:
         body = mujoco.MjSpec.from_string(body_mjcf)
         spec.attach(body, prefix=f"{place.name}/", frame=frame)
     except ValueError as error:
-        raise InvalidWorld(f"the body of {place.name}, a {place.kind}, cannot be built: {error}") from error
+        why = " ".join(str(error).split())
+        raise InvalidWorld(f"the body of {place.name}, a {place.kind}, cannot be built: {why}") from error
 
 
 def _add_target(spec: mujoco.MjSpec, target: Target) -> None:

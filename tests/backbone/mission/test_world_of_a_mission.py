@@ -159,3 +159,34 @@ def test_a_body_that_lacks_a_method_is_refused(
         world_of(tmp_path, text)
     told = {fault.message for fault in caught.value.faults}
     assert told == {f"{name}:Body is no kind of robot: it lacks body_mjcf, controls, counts"}
+
+
+@pytest.mark.parametrize(
+    ("mjcf", "told"),
+    [
+        ("<mujoco><worldbody>", "cannot be built: XML parse error"),
+        (
+            "<mujoco><worldbody><body name='body'><freejoint name='free'/></body></worldbody></mujoco>",
+            "mass and inertia",
+        ),
+        ("<mujoco><worldbody><body name='cart'/></worldbody></mujoco>", 'has no <body name="body">'),
+    ],
+    ids=["no MJCF", "without mass", "without its root"],
+)
+def test_a_body_that_mujoco_cannot_build_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, mjcf: str, told: str
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    name = f"own_mjcf_{request.node.callspec.id.replace(' ', '_').lower()}"
+    (tmp_path / f"{name}.py").write_text(
+        "from scout_model.scout import Scout\n"
+        f"class Body(Scout):\n    @classmethod\n    def body_mjcf(cls):\n        return {mjcf!r}\n"
+    )
+    no_world = 'name="simulated_world" class="backbone.component.component:Component"'
+    text = SMALL.replace(no_world, 'name="simulated_world" class="resource_pool.simulated_world:SimulatedWorld"')
+    text = text.replace('<robot name="scout1" ', f'<robot name="scout1" class="{name}:Body" ')
+    with pytest.raises(MissionInvalid) as caught:
+        world_of(tmp_path, text)
+    [fault] = caught.value.faults
+    assert told in fault.message
+    assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith("class=")
