@@ -111,6 +111,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
         shares_process: Whether the placer may put its components into a process with others.
         alike_most: Largest number of its components in one process; 1: they do not share one.
         roles: Role → kind of RC in the set of an ARC; empty: it is no ARC.
+        locates: Whether it tells where robots are.
     """
 
     doc: str = ""
@@ -127,6 +128,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     shares_process: bool = True
     alike_most: int = 1
     roles: dict[str, str] = {}
+    locates: bool = False
 
     def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
         """Return all parameters that can be set while this driver is used; None if the driver is unknown."""

@@ -18,8 +18,10 @@ from backbone.errors import Refusal
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import PLANNER, ClassFacts, ParameterFacts, Question, parameters_of
 from backbone.scheduling.own_planner import load_planner
+from backbone.wire import kinds_of
 
 BY_CLASS_ALONE = ("multipleOf", "format", "contentEncoding")  # rules of a schema that ``ParameterFacts`` lacks
+ASK_POSE = "AskPose"  # the question to localizers, which the resource pool declares
 ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; a hang or kill of their process ends no more
 
 
@@ -72,6 +74,7 @@ def _described(found: type[Component[Any]], driver: str) -> ClassFacts:
         given=tuple(sorted(found.given_elsewhere)),
         shares_process=found.shares_process,
         roles=getattr(found, "kinds", dict)(),
+        locates=found.accepts is not None and ASK_POSE in {kind.__name__ for kind in kinds_of(found.accepts)},
         alike_most=max(1, found.alike_most or (ALIKE_MOST if found.shares_process else 1)),
     )
 

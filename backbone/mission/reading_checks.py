@@ -63,7 +63,7 @@ def check_readings(behavior: Element, tables: Tables, report: Report) -> None:
 
 
 def check_named(behavior: Element, tables: Tables, report: Report) -> None:
-    """Report parameters that name a component, body or unit that the mission does not have."""
+    """Report parameters that name a component, localizer, body or unit that the mission does not have."""
     facts = tables.facts_of(behavior.text("type"))
     given = {one.text("name"): one for one in behavior.all("parameter")}
     for one in () if facts is None else facts.parameters:
@@ -88,6 +88,9 @@ def _nameable(what: str, value: str, localizer: str, tables: Tables) -> list[str
     arcs = [f"{behavior.text('name')}-{arc.text('kind')}" for behavior, arc in tables.claims()]
     pool, minds = [*tables.resources, *world, *arcs], [*(one.text("name") for one in tables.behaviors), *units]
     subsystem, _, name = value.rpartition("/")
+    if what == "localizer":
+        kinds = {name: tables.facts_of(one.text("type")) for name, one in tables.resources.items()}
+        pool = [*(name for name, facts in kinds.items() if facts is None or facts.locates), *world]
     if what == "unit":
         return units
     if what == "body":
@@ -98,7 +101,7 @@ def _nameable(what: str, value: str, localizer: str, tables: Tables) -> list[str
     if what == "source" and not (subsystem or is_legal(name)):
         return None  # any, or a text that the class refuses
     if not subsystem:
-        return pool if what == "component" else [*pool, *minds, *CORE_SERVICES, *map(creator_name, tables.hosts)]
+        return pool if what == "localizer" else [*pool, *minds, *CORE_SERVICES, *map(creator_name, tables.hosts)]
     if subsystem == Subsystem.RESOURCE_POOL:
         return pool
     return minds if subsystem == Subsystem.MISSION_CONTROL else None

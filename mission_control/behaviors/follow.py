@@ -17,7 +17,7 @@ from backbone.errors import Refusal
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
-from mission_control.behaviors.motion import DrivingSpeed, FloorPoint, NamedBody, NamedComponent
+from mission_control.behaviors.motion import DrivingSpeed, FloorPoint, NamedBody, NamedLocalizer
 from mission_control.behaviors.way import keep_distance
 
 TOLERANCE_SHARE = 0.1  # chosen: of the distance; with less the robot would move all the time
@@ -41,7 +41,7 @@ class FollowParameters(BehaviorParameters, frozen=True, kw_only=True):
     """
 
     target: NamedBody
-    localizer: NamedComponent
+    localizer: NamedLocalizer
     distance_m: Annotated[float, msgspec.Meta(ge=0.2, le=10)] = 0.5
     speed_m_s: DrivingSpeed = 0.2
 

@@ -17,7 +17,7 @@ from backbone.ranges import Duration
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
-from mission_control.behaviors.motion import Coordinate, DrivingSpeed, FloorPoint, NamedComponent, Reach
+from mission_control.behaviors.motion import Coordinate, DrivingSpeed, FloorPoint, NamedLocalizer, Reach
 from mission_control.behaviors.way import Way
 from mission_control.messages import BehaviorStatus
 
@@ -46,7 +46,7 @@ class WayParameters(BehaviorParameters, frozen=True, kw_only=True):
         within_s: Time after which the behavior fails; only time of grants counts; 0: never.
     """
 
-    localizer: NamedComponent
+    localizer: NamedLocalizer
     speed_m_s: DrivingSpeed = 0.2
     reached_within_m: Reach = 0.08
     within_s: Duration = 0.0

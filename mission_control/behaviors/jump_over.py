@@ -22,7 +22,7 @@ from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
 from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, JumpStage, Obstacle
-from mission_control.behaviors.motion import FARTHEST_M, Attempts, DrivingSpeed, Motion, NamedComponent, read_places
+from mission_control.behaviors.motion import FARTHEST_M, Attempts, DrivingSpeed, Motion, NamedLocalizer, read_places
 from mission_control.messages import BehaviorStatus
 
 
@@ -41,7 +41,7 @@ class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
 
     front: str
     heading_deg: Measure
-    localizer: NamedComponent
+    localizer: NamedLocalizer
     depth_m: Annotated[float, Meta(gt=0, le=DEEPEST_M)] = 0.1
     onward_m: Annotated[float, Meta(ge=0, le=FARTHEST_M)] = 0.5
     speed_m_s: DrivingSpeed = 0.2

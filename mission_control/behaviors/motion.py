@@ -36,10 +36,10 @@ Attempts = Annotated[int, Meta(ge=1, le=MOST_TIMES)]
 """A number of attempts."""
 Times = Annotated[int, Meta(ge=0, le=MOST_TIMES)]
 """A number of repetitions; 0: endless."""
-NamedComponent = Annotated[
-    str, Meta(min_length=1, max_length=LONGEST_MENTION, extra_json_schema={"names": "component"})
+NamedLocalizer = Annotated[
+    str, Meta(min_length=1, max_length=LONGEST_MENTION, extra_json_schema={"names": "localizer"})
 ]
-"""A component by its name if it is in the resource pool, else by its address; ``check`` searches for it."""
+"""A localizer by its name if it is in the resource pool, else by its address; ``check`` searches for it."""
 NamedBody = Annotated[str, Meta(min_length=1, max_length=LONGEST_MENTION, extra_json_schema={"names": "body"})]
 """A body that a localizer tracks; ``check`` searches for it if the project ships the localizer."""
 

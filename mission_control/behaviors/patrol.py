@@ -15,7 +15,7 @@ from backbone.ranges import Duration
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
-from mission_control.behaviors.motion import DrivingSpeed, NamedComponent, Reach, Times, read_places
+from mission_control.behaviors.motion import DrivingSpeed, NamedLocalizer, Reach, Times, read_places
 from mission_control.behaviors.patrol_route import PatrolRoute, Visit
 from mission_control.messages import BehaviorStatus, WaypointReached
 
@@ -33,7 +33,7 @@ class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
     """
 
     waypoints: str
-    localizer: NamedComponent
+    localizer: NamedLocalizer
     rounds: Times = 0
     speed_m_s: DrivingSpeed = 0.2
     reached_within_m: Reach = 0.08

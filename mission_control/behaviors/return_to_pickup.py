@@ -18,7 +18,7 @@ from msgspec import Meta
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from mission_control.behaviors.driver import DECIDE_EVERY_S
-from mission_control.behaviors.motion import Attempts, DrivingSpeed, NamedComponent, read_places
+from mission_control.behaviors.motion import Attempts, DrivingSpeed, NamedLocalizer, read_places
 from mission_control.behaviors.pickup_route import PickupRoute, PickupStage
 from mission_control.behaviors.servo_to_target import MOST_TURNS, Servo, ServoParameters, TargetNotFound
 from mission_control.vision.servo_law import Stage as Approach
@@ -38,7 +38,7 @@ class PickupParameters(ServoParameters, frozen=True, kw_only=True):
     """
 
     near: str
-    localizer: NamedComponent
+    localizer: NamedLocalizer
     speed_m_s: DrivingSpeed = 0.2
     search_turns: Annotated[float, Meta(gt=0, le=MOST_TURNS)] = 1.25
     attempts: Attempts = 3

@@ -33,11 +33,13 @@ def follow(target: str, localizer: str = "world") -> str:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (go_to("localiser"), "no component is named 'localiser' (did you mean 'localizer'?)"),
-        (go_to("watch-scout1"), "no component is named 'watch-scout1'"),
+        (go_to("radio"), "no localizer is named 'radio'"),
+        (go_to("resource_pool/watch-scout1-capture"), "no localizer is named 'resource_pool/watch-scout1-capture'"),
+        (go_to("localiser"), "no localizer is named 'localiser' (did you mean 'localizer'?)"),
+        (go_to("watch-scout1"), "no localizer is named 'watch-scout1'"),
         (
             go_to("resource_pool/localiser"),
-            "no component is named 'resource_pool/localiser' (did you mean 'localizer'?)",
+            "no localizer is named 'resource_pool/localiser' (did you mean 'localizer'?)",
         ),
         (motion_of("watch-scuot1"), "no component is named 'watch-scuot1' (did you mean 'watch-scout1'?)"),
         (
