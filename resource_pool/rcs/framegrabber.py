@@ -22,7 +22,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.component.messages import LogLevel
+from backbone.component.messages import Absence, LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -37,6 +37,8 @@ log = logging.getLogger(__name__)
 
 SILENT_S = 0.5  # chosen: a packet gets its turn on the radio within 0.3 s, and its robot appears two pictures later
 WRONG_S = 1.0  # chosen: more than clocks of hosts differ, and than a driver delivers late; mission time
+DARK_S = 2.0  # chosen: four times SILENT_S, after which a transmitter is switched on again; machine seconds
+DARK_PICTURES = 3  # chosen: so many pictures may be missing at a low rate
 LEAST_PX = 2  # chosen: vision halves pictures; a smaller one comes of a driver that got none
 ARC_REPLY_S = 1.0  # chosen: the ARC asks a robot before it answers; machine seconds
 
@@ -80,6 +82,8 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._kinds: Counter[str] = Counter()
         self._silent_since_s = math.inf
         self._newest_s, self._mistimed, self._has_told = -math.inf, 0, False
+        self._shown_s, self._dark_since_s, self._why_dark = -math.inf, math.inf, ""
+        self._told_dark: set[str] = set()
 
     async def connect(self) -> None:
         """Open the device now, so that the first grant is as fast as later ones."""
@@ -93,7 +97,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
 
     async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
         """Stop the delivery of pictures."""
-        self._tuned = None
+        self._tuned, self._dark_since_s = None, math.inf
         self._driver.stop()
 
     async def driver_exchanged(self) -> None:
@@ -118,17 +122,27 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._silent_since_s = math.inf
         self._newest_s, self._has_told = self.clock.now_s(), False
         self._tuned = order.frequency, deliver
+        self._shown_s, self._dark_since_s, self._why_dark = self.clock.now_s(), math.inf, "its device delivers none"
         self._driver.tune(order.frequency, deliver)
+        self.start_task(self._watch_for_pictures(hold.arc, deliver), "watch for pictures")
         return {}
+
+    def absences(self) -> list[Absence]:
+        """Return this RC while no picture reaches the ARC that holds it."""
+        if self._dark_since_s == math.inf:
+            return []
+        remedy = "examine receiver, cable and the robot's transmitter"
+        what = f"no picture reaches its ARC: {self._why_dark}"
+        return [Absence(self.name, self._dark_since_s, what, "waits for pictures", remedy, is_running=True)]
 
     def is_wanted(self, picture: Picture, expected: str) -> bool:
         """Return whether to deliver the picture: exactly the expected robot transmits. Count the other pictures."""
         if picture.transmitters == 0:
-            self._silent += 1
+            self._silent, self._why_dark = self._silent + 1, "no robot transmits"
         elif picture.transmitters > 1:
-            self._garbled += 1
+            self._garbled, self._why_dark = self._garbled + 1, "several robots transmit at once"
         elif expected and picture.robot and picture.robot != expected:  # a transmitter that should be off
-            self._foreign += 1
+            self._foreign, self._why_dark = self._foreign + 1, f"{picture.robot} transmits, not {expected}"
         else:
             return True
         return False
@@ -193,6 +207,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             pixels=_in_a_row(picture.pixels),
         )
         self._delivered += 1
+        self._is_shown(hold.arc)
         at = address(Subsystem.RESOURCE_POOL, hold.arc)
         self.bus.publish(f"{at}/{order.camera}" if order.camera else at, Conversation.FRAMES, frame)
 
@@ -202,12 +217,35 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         if self._newest_s <= captured_s <= now_s + wrong_s:
             self._newest_s = captured_s
             return True
-        self._mistimed += 1
+        self._mistimed, self._why_dark = self._mistimed + 1, "its pictures have an impossible time"
         if not self._has_told and not abs(captured_s - now_s) <= wrong_s:
             self._has_told = True
             what = f"delivers no picture of {captured_s:.1f} s at {now_s:.1f} s of mission time"
             self.publish_event(self.name, what, LogLevel.WARNING)
         return False
+
+    async def _watch_for_pictures(self, arc: str, deliver: Callable[[Picture], None]) -> None:
+        """Report an ARC that no picture reaches, until another tuning; say it once until pictures come again."""
+        while self._tuned is not None and self._tuned[1] is deliver:
+            driver, rate = self._driver, self.clock.rate
+            hz = driver.allowed_hz() if isinstance(driver, YieldingDriver) else self.parameters.frame_rate_hz
+            dark_s = max(DARK_S * rate, DARK_PICTURES / hz if hz > 0 else 0.0)
+            if self._dark_since_s == math.inf and self.clock.now_s() - self._shown_s >= dark_s:
+                self._dark_since_s = self._shown_s
+                self.changed()
+                if arc not in self._told_dark:
+                    self._told_dark.add(arc)
+                    self.publish_event(self.name, f"no picture reaches {arc}: {self._why_dark}", LogLevel.WARNING)
+            await self.clock.sleep_s(DARK_S / 4 * rate)
+
+    def _is_shown(self, arc: str) -> None:
+        self._shown_s = self.clock.now_s()
+        if self._dark_since_s < math.inf:
+            self._dark_since_s = math.inf
+            self.changed()
+        if arc in self._told_dark:
+            self._told_dark.discard(arc)
+            self.publish_event(self.name, f"pictures reach {arc} again", LogLevel.NOTICE)
 
     def _heard_nothing(self, hold: Hold) -> None:
         """Ask the ARC to switch a silent transmitter on, because the transmitter was reset or missed its packet."""
