@@ -1,7 +1,8 @@
 """Reports of one robot: decodes its replies, publishes its readings, watches its battery.
 
-A reply that cannot be decoded, or has a value out of range, is counted and otherwise ignored. A number that no message
-can carry, such as the infinite distance of a sonar without an echo, is left out of the readings; the others stay.
+A reply that cannot be decoded, or has a value out of range, is counted and otherwise ignored. ``WRONG_IN_A_ROW`` of
+these make one event, and ``RIGHT_IN_A_ROW`` good replies afterwards another one. A number that no message can carry,
+such as the infinite distance of a sonar without an echo, is left out of the readings; the others stay.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from resource_pool.drivers.interface import MalformedReply, ReplyReader
 from resource_pool.messages import Readings, Reply
 from resource_pool.readings_book import EVERY_S, BatteryWatch, Charge, ReadingsBook
 
+WRONG_IN_A_ROW = 3  # chosen: noise that passes the check of a packet does not come three times
+RIGHT_IN_A_ROW = 30  # chosen: three seconds at ten packets a second, so that a mixture makes one event
 BATTERY = "battery_share"
 """Field of a robot's reports with the charge of its battery, 0 to 1."""
 
@@ -51,7 +54,8 @@ class RobotReports:
         self._book = ReadingsBook(EVERY_S * max(1.0, clock.rate))
         self._battery = BatteryWatch(alarm_share)
         self._news = asyncio.Event()
-        self._read = self._malformed = 0
+        self._read = self._malformed = self._wrong_in_a_row = self._right_in_a_row = 0
+        self._is_told = False
 
     @property
     def are_read(self) -> bool:
@@ -100,10 +104,12 @@ class RobotReports:
         try:
             report = reader.read(payload)
             msgspec.convert(msgspec.to_builtins(report), type(report))  # a value is out of range
-        except (MalformedReply, msgspec.ValidationError):
+        except (MalformedReply, msgspec.ValidationError) as error:
             self._malformed += 1
+            self._count_wrong(error.detail if isinstance(error, MalformedReply) else str(error))
             return
         self._read += 1
+        self._count_right()
         fields = msgspec.structs.asdict(report)
         numbers = {name: value for name, value in fields.items() if isinstance(value, bool | int | float)}
         values = {name: value for name, value in numbers.items() if abs(value) <= MOST_MEASURE}  # not nan, see ranges
@@ -111,6 +117,18 @@ class RobotReports:
         self._news.set()
         if BATTERY in values:
             self._watch_battery(values[BATTERY])
+
+    def _count_wrong(self, why: str) -> None:
+        self._wrong_in_a_row, self._right_in_a_row = self._wrong_in_a_row + 1, 0
+        if self._wrong_in_a_row >= WRONG_IN_A_ROW and not self._is_told:
+            self._is_told = True
+            self._say(f"its replies cannot be decoded: {why}; {MalformedReply.remedy}", LogLevel.WARNING)
+
+    def _count_right(self) -> None:
+        self._wrong_in_a_row, self._right_in_a_row = 0, self._right_in_a_row + 1
+        if self._right_in_a_row >= RIGHT_IN_A_ROW and self._is_told:
+            self._is_told = False
+            self._say("its replies can be decoded again", LogLevel.NOTICE)
 
     def _watch_battery(self, share: float) -> None:
         match self._battery.see(share):
