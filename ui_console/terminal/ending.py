@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 from textual.app import App
-from textual.events import Event, InputEvent
+from textual.events import Event, InputEvent, Load
 
 from ui_console.terminal.driver import TerminalDriver
 
@@ -23,6 +24,14 @@ class EndingApp(App[None]):
         """End; after a crash, keep the crash's exit code."""
         self._is_ending = True
         super().exit(result, return_code or self.return_code or 0, message)
+
+    def on_load(self, _event: Load) -> None:
+        """Let tasks begin in the loop's next round, on every Python.
+
+        From Python 3.12 on, Textual lets all tasks of the process begin at once, for which ours are not written; and
+        uvloop 0.23 cannot create such tasks on Python 3.13.0 to 3.13.2.
+        """
+        asyncio.get_running_loop().set_task_factory(None)
 
     def ask_terminal(self) -> None:
         """Ask the terminal for its cursor: a terminal that is still there answers by a ``CursorPosition``."""
