@@ -10,6 +10,7 @@ Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import logging
 import math
@@ -78,17 +79,24 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         super().__init__(launch, bus, clock)
         self._driver: FramegrabberDriver = self.make_driver()
         self._tuned: tuple[str, Callable[[Picture], None]] | None = None
+        self._tuned_anew = asyncio.Event()
         self._delivered = self._garbled = self._silent = self._foreign = 0
         self._kinds: Counter[str] = Counter()
         self._silent_since_s = math.inf
         self._newest_s, self._mistimed, self._has_told = -math.inf, 0, False
         self._shown_s, self._dark_since_s, self._why_dark = -math.inf, math.inf, ""
+        self._watched_by = ""
         self._told_dark: set[str] = set()
 
     async def connect(self) -> None:
         """Open the device now, so that the first grant is as fast as later ones."""
         await super().connect()
         await open_device(self._driver, self.name)
+
+    async def serve(self) -> None:
+        """Report an ARC that no picture reaches, and end the hold when its lease expires."""
+        self.start_task(self._watch_for_pictures(), "watch for pictures")
+        await super().serve()
 
     async def drain(self) -> None:
         """Stop and close the device."""
@@ -123,8 +131,9 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._newest_s, self._has_told = self.clock.now_s(), False
         self._tuned = order.frequency, deliver
         self._shown_s, self._dark_since_s, self._why_dark = self.clock.now_s(), math.inf, "its device delivers none"
+        self._watched_by = hold.arc
+        self._tuned_anew.set()
         self._driver.tune(order.frequency, deliver)
-        self.start_task(self._watch_for_pictures(hold.arc, deliver), "watch for pictures")
         return {}
 
     def absences(self) -> list[Absence]:
@@ -224,19 +233,31 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             self.publish_event(self.name, what, LogLevel.WARNING)
         return False
 
-    async def _watch_for_pictures(self, arc: str, deliver: Callable[[Picture], None]) -> None:
-        """Report an ARC that no picture reaches, until another tuning; say it once until pictures come again."""
-        while self._tuned is not None and self._tuned[1] is deliver:
-            driver, rate = self._driver, self.clock.rate
-            hz = driver.allowed_hz() if isinstance(driver, YieldingDriver) else self.parameters.frame_rate_hz
-            dark_s = max(DARK_S * rate, DARK_PICTURES / hz if hz > 0 else 0.0)
-            if self._dark_since_s == math.inf and self.clock.now_s() - self._shown_s >= dark_s:
-                self._dark_since_s = self._shown_s
-                self.changed()
-                if arc not in self._told_dark:
-                    self._told_dark.add(arc)
-                    self.publish_event(self.name, f"no picture reaches {arc}: {self._why_dark}", LogLevel.WARNING)
-            await self.clock.sleep_s(DARK_S / 4 * rate)
+    async def _watch_for_pictures(self) -> None:
+        """Report an ARC that no picture reaches; say it once until pictures come again."""
+        while True:
+            await self._tuned_anew.wait()
+            dark_s = self._dark_after_s()
+            now_s = self.clock.now_s()
+            if self._tuned is None:
+                self._tuned_anew.clear()
+            elif self._dark_since_s == math.inf and now_s >= self._shown_s + dark_s:
+                self._is_dark(self._watched_by)
+            is_due_s = self._shown_s + dark_s
+            await self.clock.sleep_until_s(is_due_s if is_due_s > now_s else now_s + dark_s)
+
+    def _dark_after_s(self) -> float:
+        """Return the mission seconds without a picture after which an ARC counts as blind."""
+        driver = self._driver
+        hz = driver.allowed_hz() if isinstance(driver, YieldingDriver) else self.parameters.frame_rate_hz
+        return max(DARK_S * self.clock.rate, DARK_PICTURES / hz if hz > 0 else 0.0)
+
+    def _is_dark(self, arc: str) -> None:
+        self._dark_since_s = self._shown_s
+        self.changed()
+        if arc not in self._told_dark:
+            self._told_dark.add(arc)
+            self.publish_event(self.name, f"no picture reaches {arc}: {self._why_dark}", LogLevel.WARNING)
 
     def _is_shown(self, arc: str) -> None:
         self._shown_s = self.clock.now_s()

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.messages import Absence
 from backbone.errors import Refusal
 from backbone.rc_manager.service import RcManager
 from backbone.scheduling.events import Event, Instruction, Record
@@ -121,6 +122,10 @@ class AuditedVideoFrequency(AuditedRc[RcParameters], VideoFrequency):
 
 class AuditedFramegrabber(AuditedRc[FramegrabberParameters], Framegrabber):
     """A framegrabber."""
+
+    def absences(self) -> list[Absence]:
+        """Return nothing: its receiver takes no pictures."""
+        return []
 
 
 # ---------------------------------------------------------------------- ARCs
