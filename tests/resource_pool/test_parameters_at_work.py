@@ -190,7 +190,7 @@ def test_a_driver_that_waits_where_its_rc_does_not_is_refused(local_mission: Any
     async def main() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
             given = {"driver": f"{__name__}:WaitingGrabber", "links": {"video_frequency": ["video"]}}
-            with pytest.raises(UnknownDriver, match="stop is an 'async def'.*; adjust is an 'async def'"):
+            with pytest.raises(UnknownDriver, match=r"stop is an 'async def'.*; adjust is an 'async def'"):
                 await pool.start(Framegrabber, "grabber", given)
 
     run_virtual(main())

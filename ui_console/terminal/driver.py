@@ -15,8 +15,6 @@ import time
 from codecs import getincrementaldecoder
 from collections.abc import Iterable
 from contextlib import suppress
-from pty import STDOUT_FILENO
-from typing import Any
 
 from textual._xterm_parser import XTermParser
 from textual.app import App
@@ -28,6 +26,7 @@ from textual.message import Message
 from backbone.command_line.terminal_output import TerminalOutput
 from ui_console.terminal.keys import KEYS, action_of
 
+STANDARD_OUTPUT = 1  # POSIX: STDOUT_FILENO
 READ_MOST_BYTES = 4096  # as Textual's driver
 TICK_S = 0.1  # as Textual's driver: an escape key is known by the pause after it
 UNREAD_S = 0.5  # chosen: as long as the first press of a drive key counts
@@ -67,9 +66,11 @@ class TerminalDriver(LinuxDriver):
     _is_reading = False
     _read_s = math.inf
 
-    def __init__(self, app: App[object], **options: Any) -> None:
-        super().__init__(app, **options)
-        self._output = TerminalOutput(STDOUT_FILENO, self._draw_anew)
+    def __init__(
+        self, app: App[object], *, debug: bool = False, mouse: bool = True, size: tuple[int, int] | None = None
+    ) -> None:
+        super().__init__(app, debug=debug, mouse=mouse, size=size)
+        self._output = TerminalOutput(STANDARD_OUTPUT, self._draw_anew)
         atexit.register(self._output.wait_written, ENDS_WITHIN_S[1])
 
     def write(self, data: str) -> None:
