@@ -45,7 +45,7 @@ class ArcSwitches:
         self._service, self._context_switch, self._rcs, self._grace_s = service, context_switch, rcs, grace_s
         self._under_way: dict[str, asyncio.Task[None]] = {}
         self._times = SwitchTimes()
-        self._vain_since_s: dict[str, float] = {}
+        self._vain: dict[str, tuple[float, str]] = {}
 
     def __contains__(self, arc: str) -> bool:
         """Return whether a switch of this ARC is running."""
@@ -63,14 +63,14 @@ class ArcSwitches:
     def absences(self, unservable: Iterable[Unservable]) -> list[Absence]:
         """Return these ARCs, and those that want time and did not open their gate when they last were connected."""
         arcs, doing = self._service.manager.master_schedule.state.arcs, "the RC manager connects it again"
-        self._vain_since_s = {arc: since_s for arc, since_s in self._vain_since_s.items() if arc in arcs}
+        self._vain = {arc: vain for arc, vain in self._vain.items() if arc in arcs}
         never = [
             Absence(arc, since_s, why, f"waits until {until}", is_running=True)
             for arc, since_s, why, until in unservable
         ]
         return never + [
-            Absence(arc, since_s, self._context_switch.complaint(arc), doing, is_running=True)
-            for arc, since_s in self._vain_since_s.items()
+            Absence(arc, since_s, complaint, doing, is_running=True)
+            for arc, (since_s, complaint) in self._vain.items()
             if arcs[arc].state is not RequestState.IDLE or arcs[arc].retry_s is not None
         ]
 
@@ -100,14 +100,15 @@ class ArcSwitches:
         vain = await self._context_switch.connect(order, self._release_s(order.epochs))
         if vain is None:
             self._rcs.connected(order.epochs)
-            self._vain_since_s.pop(order.arc, None)
+            self._vain.pop(order.arc, None)
             self._times.granted(order.epochs, order.arc, order.settle_s, self._service.clock.now_s())
             self._service.happened(Opened(order.arc))
             return
         if vain.failed:
             self._rcs.failed(vain.failed)
         else:
-            self._vain_since_s.setdefault(order.arc, self._service.clock.now_s())
+            since_s, _complaint = self._vain.get(order.arc, (self._service.clock.now_s(), ""))
+            self._vain[order.arc] = since_s, vain.complaint
         for rc in vain.unconfirmed:
             self._rcs.does_not_answer(rc)
         self._service.happened(OpenFailed(order.arc, vain.failed))

@@ -56,10 +56,12 @@ class Vain(NamedTuple):
     Attributes:
         failed: The RC that failed; empty if it was the ARC.
         unconfirmed: RCs that did not confirm their disconnection: see ``revoke``.
+        complaint: Why the ARC did not open its gate; empty if an RC failed.
     """
 
     failed: str
     unconfirmed: list[str]
+    complaint: str
 
 
 class ContextSwitch:
@@ -80,14 +82,14 @@ class ContextSwitch:
         """Return whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
         return arc in self._given_back
 
-    def complain(self, subject: str, what: str, error: Refusal | LinkError) -> None:
-        """Add the failure of an RC or ARC to its story, and keep it as its last one."""
-        self._note(subject, f"{what}: {error}")
-        self._complaints[subject] = f"{what}: {error.detail if isinstance(error, Refusal) else error}"
+    def complain(self, rc: str, what: str, error: Refusal | LinkError) -> None:
+        """Add the failure of an RC to its story, and keep it as its last one."""
+        self._note(rc, f"{what}: {error}")
+        self._complaints[rc] = _in_words(what, error)
 
-    def complaint(self, subject: str) -> str:
-        """Return the last failure of an RC or ARC."""
-        return self._complaints.get(subject, "")
+    def complaint(self, rc: str) -> str:
+        """Return the last failure of an RC."""
+        return self._complaints.get(rc, "")
 
     async def connect(self, order: ConnectArc, within_s: float) -> Vain | None:
         """Connect all RCs to the ARC and order it to open its gate, or undo all of it.
@@ -101,7 +103,8 @@ class ContextSwitch:
         """
         settled_s = self._clock.now_s() + order.settle_s
         failed = await self._connect_rcs(order)
-        if failed is None and await self._open_gate(order, settled_s):
+        complaint = "" if failed else await self._open_gate(order, settled_s)
+        if not (failed or complaint):
             return None
         close = CloseGate("failed", failed or order.arc, 0.0, -1.0)
         holds, why = _holds(order.arc, order.epochs), f"failed at {failed or order.arc}"
@@ -112,7 +115,7 @@ class ContextSwitch:
                 undoing = both.create_task(self._disconnect(holds, why, self._clock.now_s() + within_s))
         finally:
             self._given_back.discard(order.arc)
-        return Vain(failed or "", undoing.result())
+        return Vain(failed or "", undoing.result(), complaint)
 
     async def revoke(self, order: RevokeArc, within_s: float) -> list[str]:
         """Close the ARC's gate and disconnect its RCs; return when all RCs are free, except skipped ones.
@@ -173,16 +176,17 @@ class ContextSwitch:
                 raise outcome
         return None
 
-    async def _open_gate(self, order: ConnectArc, settled_s: float) -> bool:
+    async def _open_gate(self, order: ConnectArc, settled_s: float) -> str:
+        """Have the ARC open its gate; return why it did not, or an empty text."""
         question = OpenGate(dict(order.epochs), settled_s, order.until_s)
         try:
             await self._bus.ask(in_pool(order.arc), question, GateOpens, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
             log.warning("%s did not open: %s", order.arc, error)
-            self.complain(order.arc, "did not open its gate", error)
-            return False
+            self._note(order.arc, f"did not open its gate: {error}")
+            return _in_words("did not open its gate", error)
         await self._clock.sleep_until_s(settled_s)  # the ARC opens by the same clock: it need not report that
-        return True
+        return ""
 
     async def _close_gate(self, arc: str, question: CloseGate) -> None:
         within_s = question.deadline_s / self._clock.rate or CLOSE_S
@@ -226,6 +230,10 @@ class ContextSwitch:
     def _real_s(self, until_s: float) -> float:
         """Return the seconds until then on the machine's clock."""
         return (until_s - self._clock.now_s()) / self._clock.rate
+
+
+def _in_words(what: str, error: Refusal | LinkError) -> str:
+    return f"{what}: {error.detail if isinstance(error, Refusal) else error}"
 
 
 def _holds(arc: str, epochs: Mapping[str, int]) -> list[Hold]:
