@@ -56,11 +56,15 @@ class KnownKeys(XTermParser):
         return super()._sequence_to_key_events(sequence, alt=bool(alt))
 
 
+class KeysDropped(Message):
+    """Keys or presses of the mouse had no effect, because they came while the process did not read."""
+
+
 class TerminalDriver(LinuxDriver):
     """Driver of a terminal in which a person may type anything.
 
     Law: presses of keys and mouse have no effect if the process did not read for ``UNREAD_S``, because it was stopped;
-    only the keys of the emergency stop have.
+    only the keys of the emergency stop have. The screen gets a ``KeysDropped`` then.
     """
 
     _is_reading = False
@@ -132,16 +136,21 @@ class TerminalDriver(LinuxDriver):
                     return  # the terminal was closed
                 before_s, self._read_s = self._read_s, time.monotonic()
                 is_late = self._read_s > before_s + UNREAD_S
+                dropped = 0
                 for character in decode(typed):
                     try:
                         for event in parser.feed(character):
-                            self._pass_on(event, is_late=is_late)
+                            dropped += not self._passed_on(event, is_late=is_late)
                     except (ValueError, OverflowError):  # an escape sequence with an impossible number
                         parser = KnownKeys()
                 for event in parser.tick():
-                    self._pass_on(event, is_late=is_late)
+                    dropped += not self._passed_on(event, is_late=is_late)
+                if dropped:
+                    self.process_message(KeysDropped())
 
-    def _pass_on(self, event: Message, *, is_late: bool) -> None:
+    def _passed_on(self, event: Message, *, is_late: bool) -> bool:
         is_stop = isinstance(event, Key) and event.key in STOPPING
-        if is_stop or not (is_late and isinstance(event, Key | MouseDown | Paste)):
-            self.process_message(event)
+        if is_late and not is_stop and isinstance(event, Key | MouseDown | Paste):
+            return False
+        self.process_message(event)
+        return True

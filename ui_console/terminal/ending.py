@@ -8,7 +8,9 @@ from typing import Any
 from textual.app import App
 from textual.events import Event, InputEvent, Load
 
-from ui_console.terminal.driver import TerminalDriver
+from ui_console.terminal.driver import KeysDropped, TerminalDriver
+
+DROPPED = "keys were dropped: this console stood still when you typed them. Press anew."
 
 
 class EndingApp(App[None]):
@@ -37,6 +39,10 @@ class EndingApp(App[None]):
         """Ask the terminal for its cursor: a terminal that is still there answers by a ``CursorPosition``."""
         if isinstance(self._driver, TerminalDriver):
             self._driver.ask_position()
+
+    def on_keys_dropped(self, _message: KeysDropped) -> None:
+        """Say why the keys had no effect."""
+        self.notify(DROPPED, severity="warning")
 
     async def on_event(self, event: Event) -> None:
         """Process an event; while the screen ends, drop keys and mouse events."""
