@@ -207,7 +207,8 @@ async def bring_up_on_console(
     zenoh_threads.few_threads()
     stream, output = sys.stdout if live else sys.stderr, None
     if stream.isatty():
-        output = TerminalOutput(stream.fileno(), lambda: None, stream.encoding)
+        output = TerminalOutput(stream.fileno(), lambda: None if live else _lines_are_missing(output), stream.encoding)
+        output.drops = live
     file = cast("IO[str]", TerminalFile(output)) if output is not None else stream
     console = Console(file=file, markup=False, emoji=False)
     try:
@@ -217,6 +218,11 @@ async def bring_up_on_console(
     finally:
         if output is not None:
             output.wait_written(ENDS_WITHIN_S)
+
+
+def _lines_are_missing(output: TerminalOutput | None) -> None:
+    if output is not None:
+        output.write("lines are missing here, because this terminal was not read\n")
 
 
 async def _bring_up(description: MissionDescription, options: UpOptions, observer: ConsoleObserver) -> int:

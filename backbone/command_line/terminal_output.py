@@ -14,27 +14,30 @@ from collections import deque
 from collections.abc import Callable
 
 BEHIND_S = 0.5  # chosen: older pictures help nobody, and a terminal that reads takes them at once
+MOST_WAITING_BYTES = 1 << 20  # chosen: the lines of a day in which much happens
 
 
 class TerminalOutput:
     """The output of one terminal.
 
-    Law: ``write`` returns at once, in order, and never a part of a text is lost. If the terminal has not taken a text
-    for ``BEHIND_S``, all later ones are dropped until it has taken the earlier ones; then ``caught_up`` is called.
+    Law: ``write`` returns at once, in order, and never a part of a text is lost. Pictures are dropped if the terminal
+    has not taken a text for ``BEHIND_S``, and everything if ``MOST_WAITING_BYTES`` wait; once the terminal has taken
+    what waited, ``caught_up`` is called.
 
     Args:
         descriptor: File descriptor of the terminal.
-        caught_up: Called in another thread: the screen has to be drawn anew.
+        caught_up: Called in another thread after texts were dropped: a picture has to be drawn anew.
         encoding: Of the terminal.
 
     Attributes:
-        drops: False: no text is dropped, for those that change the terminal's mode.
+        drops: True: texts are pictures. False: they are lines, or change the terminal's mode.
     """
 
     def __init__(self, descriptor: int, caught_up: Callable[[], None], encoding: str = "utf-8") -> None:
         self.drops = True
         self._descriptor, self._caught_up, self._encoding = descriptor, caught_up, encoding
         self._waiting: deque[tuple[float, bytes]] = deque()
+        self._waiting_bytes = 0
         self._has_dropped = self._is_gone = False
         self._news = threading.Condition()
         threading.Thread(target=self._run, name="terminal-output", daemon=True).start()
@@ -43,10 +46,13 @@ class TerminalOutput:
         """Write the text as soon as the terminal takes it."""
         now_s = time.monotonic()
         with self._news:
-            if self.drops and self._waiting and now_s > self._waiting[0][0] + BEHIND_S:
+            is_behind = self.drops and self._waiting and now_s > self._waiting[0][0] + BEHIND_S
+            if is_behind or self._waiting_bytes > MOST_WAITING_BYTES:
                 self._has_dropped = True
             elif not self._is_gone:
-                self._waiting.append((now_s, text.encode(self._encoding, "backslashreplace")))
+                said = text.encode(self._encoding, "backslashreplace")
+                self._waiting.append((now_s, said))
+                self._waiting_bytes += len(said)
                 self._news.notify_all()
 
     def wait_written(self, within_s: float) -> bool:
@@ -66,6 +72,7 @@ class TerminalOutput:
                     self._waiting.clear()
                 else:
                     self._waiting.popleft()
+                    self._waiting_bytes -= len(text)
                 has_dropped = self._has_dropped and not self._waiting
                 if has_dropped:
                     self._has_dropped = False
