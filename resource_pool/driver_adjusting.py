@@ -27,11 +27,11 @@ def adjust_all(drivers: Sequence[AdjustableDriver], site: DriverSite, former: Dr
         try:
             driver.adjust(site)
         except UNPROVED as error:
-            for changed in drivers[:number]:
-                changed.adjust(former)
-            if isinstance(error, Refusal):
+            is_refusal = isinstance(error, Refusal)  # then it changed nothing
+            are_back = [_is_back(one, former) for one in (drivers[:number] if is_refusal else drivers[: number + 1])]
+            if is_refusal:
                 raise
-            kept = "" if _is_back(driver, former) else "; it may have kept a part of the change"
+            kept = "" if all(are_back) else "; it may have kept a part of the change"
             raise WrongParameter(
                 f"the driver of {site.resource} failed while it changed: {complaint(error)}{kept}",
                 remedy="Mend the driver's adjust; the component uses the value from its next start on.",
