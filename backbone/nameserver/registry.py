@@ -230,7 +230,10 @@ class Registry:
     # ------------------------------------------------------------------
     def _record(self, entry: _Entry, state: ComponentState) -> None:
         entry.state, name = state, component_of(state.address)
-        self._stops[name] = state.stop  # kept after its end, because the next one may start on another host
+        if state.stop is None and self._otherwise is None:
+            self._stops.pop(name, None)
+        else:  # kept after its end, because the next one may start on another host
+            self._stops[name] = state.stop
 
     def _token_fell(self, name: str, address: str, now_s: float) -> list[Instruction]:
         self._introducing.discard(address)
