@@ -27,7 +27,14 @@ class Switching:
         self._state = schedule.state
 
     def make_way(self, turn: Turn) -> None:
-        """Revoke the holders that block the ARC whose turn it is; ended slices before preempted ones."""
+        """Revoke the holders that block the ARC whose turn it is; ended slices before preempted ones.
+
+        Raises:
+            AssertionError: The planner, one's own perhaps, is wrong: the ARC does not wait, or a holder has no RCs.
+        """
+        self._require(turn.arc, RequestState.WAITING)
+        for holder in turn.in_the_way:
+            self._require(holder, RequestState.CONNECTING, RequestState.RUNNING)
         for holder in in_order_of_revocation(turn):
             served, overridden = holder.served(self._decision.now_s), turn.arc.goes_before(holder)
             forced = overridden and not served
@@ -40,7 +47,17 @@ class Switching:
                 self._transitions.revoke(holder, "slice", turn.arc.name)
 
     def connect(self, arc: ArcEntry) -> None:
-        """Connect an ARC whose RCs are all free, each with a new epoch, so that they begin to settle."""
+        """Connect an ARC whose RCs are all free, each with a new epoch, so that they begin to settle.
+
+        Raises:
+            AssertionError: The planner, one's own perhaps, is wrong: the ARC does not wait, or its RCs are not free.
+        """
+        self._require(arc, RequestState.WAITING)
+        holders = self._schedule.table.holders(arc)
+        if not self._schedule.table.fits(arc, holders):
+            raise AssertionError(
+                f"the planner connects {arc.name}, but {', '.join(holder.name for holder in holders)} holds its RCs"
+            )
         now_s, rcs, ranks = self._decision.now_s, self._state.rcs, self.ranks(arc)
         for rc in arc.uses:
             rcs[rc].epoch += 1
@@ -62,6 +79,15 @@ class Switching:
                 arc.request.uses_of(arc.uses),
             )
         )
+
+    def _require(self, arc: ArcEntry, *states: RequestState) -> None:
+        """Return if the ARC is one of the schedule and in one of the states, else raise."""
+        if self._state.arcs.get(arc.name) is not arc:
+            raise AssertionError(f"the planner's turn names {arc.name}, but not the ARC in the schedule")
+        if arc.state not in states:
+            raise AssertionError(
+                f"the planner's turn names {arc.name}, which is {arc.state}, not {' or '.join(states)}"
+            )
 
     def ranks(self, arc: ArcEntry) -> dict[str, int]:
         """Return the ARC's place by user priority among the holders of each sharable RC it uses."""

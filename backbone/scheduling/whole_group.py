@@ -85,7 +85,7 @@ class WholeGroupPlanner:
         return turn.arc if turn is not None else None
 
     def _due_in(self, group: Group[ArcEntry], now_s: float) -> Turn | None:
-        order, possible = self._table.line(group.arcs, now_s, self.order)
+        order, possible = self._table.line(group.arcs, now_s, self._in_order)
         if not possible:
             return None
         plans = self._plans[group] = GroupPlans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
@@ -192,7 +192,7 @@ class WholeGroupPlanner:
         """
         arcs = [*group]
         slack_s = self._slack_s if slack_s is None else slack_s
-        order = self.order(arcs)
+        order = self._in_order(arcs)
         return Plan(self._table, order, arcs, now_s, slack_s=slack_s, handed_over=handed_over).slots()
 
     def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
@@ -208,19 +208,29 @@ class WholeGroupPlanner:
         self._forget_outdated()
         group = self._state.groups.of[arc]
         if group not in self._plans:
-            order = self.order(group.arcs)
+            order = self._in_order(group.arcs)
             self._plans[group] = GroupPlans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
         return self._plans[group].now.start_s(arc)
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the queued ARCs of its group that come before a queued one, in order."""
-        order = self.order(self._state.group_of(arc))
+        order = self._in_order(self._state.group_of(arc))
         return order[: order.index(arc)]
 
     def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return none: every queued ARC has a reserved start."""
         del arc
         return []
+
+    def _in_order(self, arcs: Iterable[ArcEntry]) -> list[ArcEntry]:
+        """Return what ``order`` does, which a planner of one's own may get wrong: then no plan would ever end."""
+        arcs = [*arcs]
+        order = self.order(arcs)
+        queued = {arc for arc in arcs if arc.queued}
+        if len(order) != len(queued) or {*order} != queued:
+            told = ", ".join(arc.name for arc in order) or "nothing"
+            raise AssertionError(f"the planner's order is {told}, not each queued ARC once")
+        return order
 
     def order(self, arcs: Iterable[ArcEntry]) -> list[ArcEntry]:
         """Return the queued ARCs among ARCs of one group, the first in line first (rule 2)."""
