@@ -137,7 +137,7 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     rules = msgspec.convert(description.core_parameters("rc_manager"), SchedulingRules)
     try:
         return _dry_run(description, rules, for_s)
-    except (AssertionError, BackboneError):
+    except BackboneError:
         raise
     except Exception as error:
         if not rules.planner:

@@ -49,3 +49,12 @@ def test_a_planner_that_fails_at_work_is_refused_by_the_dry_run(
     told = capsys.readouterr().err
     assert "planner_with_a_bug:Own: AttributeError" in told
     assert "planner_with_a_bug.py, line 3" in told
+
+
+def test_a_planner_that_finds_its_own_fault_is_refused_by_the_dry_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    method = "def due(self, now_s): assert False, 'my own check'"
+    mission = read_mission(file_of(tmp_path, monkeypatch, "planner_that_asserts", method))
+    assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
+    assert "planner_that_asserts:Own: AssertionError: my own check" in capsys.readouterr().err
