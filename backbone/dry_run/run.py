@@ -68,7 +68,7 @@ class Claimed:
         turns: Grants until the end of the dry run.
         first_grant_s: Mission time of the first grant; None: no grant.
         worst_wait_s: Longest wait, including a wait at the end.
-        why: Its state at the end, with the reason; None: it was refused.
+        why: Its state at the end, with the reason; None: it was refused, or got a turn.
     """
 
     arc: str
@@ -300,7 +300,7 @@ def _claimed(
         turns=len(grants),
         first_grant_s=min(grants, default=None),
         worst_wait_s=timetable.worst_wait_s(claim.arc),
-        why=None if refused else answers.why(claim.arc, timetable.end_s),
+        why=None if refused or grants else answers.why(claim.arc, timetable.end_s),
     )
 
 

@@ -121,6 +121,13 @@ def test_two_behaviors_of_equal_priority_take_turns() -> None:
     assert right.worst_wait_s == pytest.approx(6.0)
 
 
+def test_only_a_request_without_a_turn_is_explained() -> None:
+    """Each explanation plays the schedule on: with 20 watchers this took most of the time of a dry run."""
+    dry = dry_run(mission(watch("left", robot="scout1"), watch("right", robot="scout2")), 4.0)
+    assert [claimed.turns for claimed in dry.claimed] == [1, 0]
+    assert [claimed.why is not None for claimed in dry.claimed] == [False, True]
+
+
 def test_a_lower_behavior_never_runs_and_the_higher_one_is_named() -> None:
     dry = dry_run(mission(watch("high", 2, robot="scout1"), watch("low", 1, robot="scout2")))
     high, low = dry.claimed
