@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing.synchronize import Event
 from typing import TypeVar
 
 Order = TypeVar("Order")
@@ -50,7 +51,7 @@ def run_all(
 def results_of(
     work: Callable[[Order], Result], orders: Sequence[Order], *, jobs: int = 0, chunk: int = 1
 ) -> Generator[Result, None, None]:
-    """Yield the results in the order of the orders; after the generator is closed, no further call is started.
+    """Yield the results in the order of the orders; after the generator is closed or interrupted, no call runs on.
 
     Args:
         work: As for ``run_all``.
@@ -64,16 +65,27 @@ def results_of(
         return
     # Spawned, not forked: a fork of a process with threads of its own may hang.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, initializer=_begin) as pool:
+    unwanted = context.Event()
+    with ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(unwanted,)) as pool:
         try:
             yield from pool.map(partial(_worked, work), orders, chunksize=chunk)
+        except BaseException:
+            unwanted.set()  # else a person who interrupts waits for half a minute of work
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _begin() -> None:
+def _begin(unwanted: Event) -> None:
     _keep_to_one_core()
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_if, args=(unwanted,), daemon=True).start()
+
+
+def _end_if(unwanted: Event) -> None:
+    """End at once when nobody wants the results any more."""
+    unwanted.wait()
+    os._exit(1)
 
 
 def _end_with_parent() -> None:

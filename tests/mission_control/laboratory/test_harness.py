@@ -6,12 +6,13 @@ import gc
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import psutil
 import pytest
 
-from mission_control.laboratory.harness import run_all
+from mission_control.laboratory.harness import results_of, run_all
 
 
 def squared(number: int) -> tuple[int, int]:
@@ -21,6 +22,12 @@ def squared(number: int) -> tuple[int, int]:
 def picky(number: int) -> int:
     if number == 7:
         raise ArithmeticError("seven")
+    return number
+
+
+def long_after_the_first(number: int) -> int:
+    if number:
+        time.sleep(60.0)
     return number
 
 
@@ -58,6 +65,15 @@ def test_progress_is_told_after_each_result() -> None:
 def test_the_first_failure_is_raised(jobs: int) -> None:
     with pytest.raises(ArithmeticError, match="seven"):
         run_all(picky, range(12), jobs=jobs)
+
+
+@pytest.mark.processes
+def test_work_that_nobody_wants_any_more_is_not_awaited() -> None:
+    results = results_of(long_after_the_first, range(8), jobs=2)
+    assert next(results) == 0
+    began_s = time.monotonic()
+    results.close()
+    assert time.monotonic() - began_s < 30.0
 
 
 @pytest.mark.processes
