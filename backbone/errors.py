@@ -12,10 +12,15 @@ A code is for machines, the detail carries the numbers for people, the remedy is
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from traceback import walk_tb
 from typing import ClassVar
 
-from backbone.printable_text import printable
+from backbone.printable_text import MOST_CHARACTERS, printable
+
+_PACKAGES = frozenset({"backbone", "mission_control", "resource_pool", "scout_model", "ui_console"})
+_NOT_A_DEVELOPERS = _PACKAGES | sys.stdlib_module_names
 
 Fact = str | int | float | bool
 
@@ -84,18 +89,36 @@ def code_of(refusal: Refusal) -> str:
     return str(refusal.facts.get("code", refusal.code)) if isinstance(refusal, UnknownRefusal) else refusal.code
 
 
-def complaint(error: BaseException) -> str:
-    """Return an exception as one printable line of bounded length, with the place in the code if it has one.
+def complaint(error: BaseException, most: int = MOST_CHARACTERS) -> str:
+    """Return an exception as one printable line of bounded length, with its place in the code if it has one.
+
+    Args:
+        most: Characters of the exception's own text; the place is never cut off.
 
     Example:
         >>> complaint(ValueError("no picture"))
         'ValueError: no picture'
     """
-    told, trace = printable(" ".join(f"{type(error).__name__}: {error}".split())), error.__traceback__
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
-    where = "" if trace is None else f" ({trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno})"
-    return told + printable(where)
+    told = printable(" ".join(f"{type(error).__name__}: {error}".split()), most)
+    frames = list(walk_tb(error.__traceback__))
+    inmost = f"{frames[-1][0].f_code.co_filename}, line {frames[-1][1]}" if frames else ""
+    place = own_place(error) or printable(inmost)
+    return f"{told} ({place})" if place else told
+
+
+def own_place(error: BaseException) -> str:
+    """Return the file and line of a developer through which an exception came; empty: it came through none.
+
+    Such a line can be mended by him, unlike the line of a library or of this project that raised at his call.
+    """
+    if isinstance(error, SyntaxError) and error.filename is not None:
+        return printable(f"{error.filename}, line {error.lineno}")
+    places = [
+        (str(frame.f_globals.get("__name__")).partition(".")[0], f"{frame.f_code.co_filename}, line {line}")
+        for frame, line in walk_tb(error.__traceback__)
+    ]
+    own = next((package for package, _ in places if package not in _NOT_A_DEVELOPERS), "")
+    return printable(next((place for package, place in reversed(places) if package == own), ""))
 
 
 class LinkError(BackboneError):

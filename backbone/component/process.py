@@ -26,7 +26,7 @@ from backbone.waiting import end_tasks
 
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
 _REFUSED = "process %d: %s ended, refused [%s]: %s (remedy: %s)"
-MOST_CAUSE = 300  # chosen: exception, place and a sentence; it is shown in one line beside other facts
+MOST_CAUSE = 300  # chosen: exception and a sentence; it is shown in one line beside other facts
 _CAUSE_LINE = re.compile(r" process (\d+): (\S+) ended(?: by a bug:|, refused \[\S+\]:|: \w+:) (.*)$")
 _REFUSED_LINE = re.compile(r" (\S+) ended, refused \[([^]]+)\]: (.*) \(remedy: (.*)\)$")
 
@@ -75,7 +75,7 @@ def exit_code_of(error: BaseException, address: str) -> int:
             log.error("process %d: %s ended: %s: %s", pid, address, type(error).__name__, error)
             return EXIT_NO_HUB
         case _:
-            bug = printable(complaint(error), MOST_CAUSE)
+            bug = complaint(error, MOST_CAUSE)
             log.error("process %d: %s ended by a bug: %s", pid, address, bug, exc_info=error)
             return EXIT_BUG
 
@@ -111,7 +111,7 @@ def cause_in_log(lines: Iterable[str], address: str, pid: int) -> str:
     causes = [
         found[3] for found in map(_CAUSE_LINE.search, lines) if found and found.group(1, 2) == (str(pid), address)
     ]
-    return printable(causes[-1], MOST_CAUSE) if causes else ""
+    return printable(causes[-1], 2 * MOST_CAUSE) if causes else ""
 
 
 async def _live(component_class: type[AnyComponent], launch: Launch) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.errors import LinkError, NoResponder, Refusal, ReplyTimeout, UnknownRefusal, code_of, revive
+from backbone.errors import LinkError, NoResponder, Refusal, ReplyTimeout, UnknownRefusal, code_of, complaint, revive
 from backbone.wire import Refused
 
 
@@ -80,3 +82,30 @@ def test_no_answer_is_not_a_refusal() -> None:
     for kind in (NoResponder, ReplyTimeout):
         assert issubclass(kind, LinkError)
         assert not issubclass(kind, Refusal)
+
+
+def test_a_complaint_names_the_line_of_the_developer_and_not_that_of_the_library_which_he_called() -> None:
+    with pytest.raises(json.JSONDecodeError) as raised:
+        json.loads("nonsense")
+    assert complaint(raised.value).endswith(f"({__file__}, line {raised.traceback[0].lineno + 1})")
+
+
+def test_a_complaint_names_the_innermost_line_of_his_package() -> None:
+    def deeper() -> None:
+        json.loads("nonsense")
+
+    with pytest.raises(json.JSONDecodeError) as raised:
+        deeper()
+    assert complaint(raised.value).endswith(f"({__file__}, line {deeper.__code__.co_firstlineno + 1})")
+
+
+def test_a_complaint_about_a_file_that_python_cannot_read_names_its_line(tmp_path: Path) -> None:
+    with pytest.raises(SyntaxError) as raised:
+        compile("def act(self:\n    pass\n", tmp_path / "own.py", "exec")
+    assert complaint(raised.value).endswith(f"({tmp_path / 'own.py'}, line 1)")
+
+
+def test_a_long_complaint_keeps_its_place() -> None:
+    with pytest.raises(ValueError, match="x") as raised:
+        raise ValueError("x" * 1000)
+    assert complaint(raised.value, 100).endswith(f" more) ({__file__}, line {raised.traceback[0].lineno + 1})")
