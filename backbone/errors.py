@@ -15,12 +15,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from traceback import walk_tb
+from types import FrameType
 from typing import ClassVar
 
 from backbone.printable_text import MOST_CHARACTERS, printable
 
 _PACKAGES = frozenset({"backbone", "mission_control", "resource_pool", "scout_model", "ui_console"})
-_NOT_A_DEVELOPERS = _PACKAGES | sys.stdlib_module_names
+_LIBRARIES = frozenset({"cv2", "mcap", "msgspec", "mujoco", "numpy", "pydantic", "rich", "textual", "uvloop", "zenoh"})
+_NOT_A_DEVELOPERS = _PACKAGES | _LIBRARIES | sys.stdlib_module_names
 
 Fact = str | int | float | bool
 
@@ -114,11 +116,16 @@ def own_place(error: BaseException) -> str:
     if isinstance(error, SyntaxError) and error.filename is not None:
         return printable(f"{error.filename}, line {error.lineno}")
     places = [
-        (str(frame.f_globals.get("__name__")).partition(".")[0], f"{frame.f_code.co_filename}, line {line}")
-        for frame, line in walk_tb(error.__traceback__)
+        (_package(frame), f"{frame.f_code.co_filename}, line {line}") for frame, line in walk_tb(error.__traceback__)
     ]
     own = next((package for package, _ in places if package not in _NOT_A_DEVELOPERS), "")
     return printable(next((place for package, place in reversed(places) if package == own), ""))
+
+
+def _package(frame: FrameType) -> str:
+    """Return the outermost package of the code in this frame; a program that ``python -m`` runs has one, too."""
+    spec = frame.f_globals.get("__spec__")
+    return str(frame.f_globals.get("__name__") if spec is None else spec.name).partition(".")[0]
 
 
 class LinkError(BackboneError):

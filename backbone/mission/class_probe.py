@@ -14,7 +14,7 @@ import msgspec
 from backbone.component.class_faults import class_faults
 from backbone.component.component import Component
 from backbone.component.field_docs import field_docs
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint, own_place
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import PLANNER, ClassFacts, ParameterFacts, Question, parameters_of
 from backbone.scheduling.own_planner import load_planner
@@ -37,7 +37,7 @@ def facts_of(asked: str) -> ClassFacts:
     try:
         found = getattr(importlib.import_module(module), name)
     except Exception as error:  # a module that is being written raises anything
-        return ClassFacts(failure=f"its module cannot be imported: {type(error).__name__}: {error}")
+        return ClassFacts(failure=f"its module cannot be imported: {_told(error)}")
     if not (isinstance(found, type) and issubclass(found, Component)):
         return ClassFacts(failure="it is no component: it does not derive from backbone.component.component:Component")
     if faults := "; ".join(class_faults(found)):
@@ -47,7 +47,25 @@ def facts_of(asked: str) -> ClassFacts:
     except Refusal as error:
         return ClassFacts(failure=error.detail)
     except Exception as error:  # a type of a parameter without a schema, or a hook of the class with a bug
-        return ClassFacts(failure=f"its parameters or abilities cannot be listed: {type(error).__name__}: {error}")
+        told = _without_schema(found) or _told(error)
+        return ClassFacts(failure=f"its parameters or abilities cannot be listed: {told}")
+
+
+def _told(error: Exception) -> str:
+    return complaint(error if own_place(error) else error.with_traceback(None))  # no place in our own code
+
+
+def _without_schema(found: type[Component[Any]]) -> str:
+    """Return the first parameter of a type that no message carries; empty: there is none."""
+    try:
+        for field in msgspec.structs.fields(found.parameters_type):
+            try:
+                msgspec.json.schema(field.type)
+            except TypeError as error:
+                return f"parameter {field.name}: {_told(error)}"
+    except Exception:  # the class itself has the fault, which the caller tells
+        return ""
+    return ""
 
 
 def _planner_fault(class_path: str) -> str:
@@ -100,7 +118,7 @@ def refusal(question: Question) -> str:
     except msgspec.ValidationError as error:
         return str(error)
     except Exception as error:  # a rule of the class with a bug, with which its component could not start either
-        return f"{type(error).__name__}: {error}"
+        return _told(error)
     return ""
 
 

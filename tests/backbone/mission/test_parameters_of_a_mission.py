@@ -80,14 +80,19 @@ def test_a_class_of_ones_own_is_asked_for_its_parameters(modules: Path) -> None:
 @pytest.mark.parametrize(
     ("code", "reason"),
     [
-        ("import no_such_module\nclass Own: ...", "its module cannot be imported: ModuleNotFoundError"),
-        ("class Own:\n  1 / 0", "its module cannot be imported: ZeroDivisionError"),
+        (
+            "\nimport no_such_module\nclass Own: ...",
+            "ModuleNotFoundError: No module named 'no_such_module' ({file}, line 2)",
+        ),
+        ("class Own:\n  1 / 0", "its module cannot be imported: ZeroDivisionError: division by zero ({file}, line 2)"),
+        ("import json\njson.loads('no')\nclass Own: ...", "Expecting value: line 1 column 1 (char 0) ({file}, line 2)"),
+        ("class Own:\n  def act(self:\n    ...", " ({file}, line 2)"),
         ("print('Own')\nimport os\nos._exit(3)", "the process that imports its module ends without an answer"),
         ("import sys\nsys.exit('Own')", "the process that imports its module ends without an answer"),
-        (GOOD.replace("float = 1.0", "type | set[complex] = int"), "abilities cannot be listed: TypeError"),
+        (GOOD.replace("float = 1.0", "type | set[complex] = int"), "cannot be listed: parameter depth_m: TypeError"),
         (GOOD.replace("Own(Component):", "Own(Component):\n    driver_options = 5"), "cannot be listed: TypeError"),
     ],
-    ids=["import", "error", "exit", "sys.exit", "no schema", "hook"],
+    ids=["import", "error", "library", "syntax", "exit", "sys.exit", "no schema", "hook"],
 )
 def test_a_class_that_cannot_be_imported_is_a_fault_at_its_type(
     modules: Path, code: str, reason: str, request: pytest.FixtureRequest
@@ -97,7 +102,7 @@ def test_a_class_that_cannot_be_imported_is_a_fault_at_its_type(
     text = with_own_type(f"{name}:Own", any="thing").replace('name="view_s"', 'name="veiw_s"')
     at_type, at_parameter = faults_in(modules, text)
     assert text.splitlines()[at_type.line - 1][at_type.column - 1 :].startswith(f'class="{name}:Own"')
-    assert reason in at_type.message
+    assert reason.format(file=modules / f"{name}.py") in at_type.message
     assert at_type.remedy
     assert "veiw_s" in at_parameter.message
 
@@ -132,7 +137,8 @@ def test_a_rule_of_a_class_with_a_bug_is_a_fault_and_hides_no_other(modules: Pat
     mine = '    <behavior type="other" name="yours" priority="1"><parameter name="depth_m" value="3.5"/></behavior>'
     text = text.replace("  </types>", other, 1).replace("  </behaviors>", f"{mine}\n  </behaviors>")
     bug, refusal = faults_in(modules, text)
-    assert bug.message == "own mine refuses its parameters: KeyError: '2.5 is too deep'"
+    line = f"{modules / 'own_keyerror.py'}, line 14"
+    assert bug.message == f"own mine refuses its parameters: KeyError: '2.5 is too deep' ({line})"
     assert refusal.message == "other yours refuses its parameters: 3.5 is too deep"
 
 
