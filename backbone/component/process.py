@@ -20,6 +20,8 @@ from backbone.component.component import AnyComponent
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
+from backbone.component.messages import LogLevel
+from backbone.component.stray_faults import strays_told
 from backbone.errors import BackboneError, Refusal, code_of, complaint, revive
 from backbone.printable_text import printable
 from backbone.waiting import end_tasks
@@ -125,7 +127,8 @@ async def _live(component_class: type[AnyComponent], launch: Launch) -> None:
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, component.end, signal.Signals(number).name)
-    await run_with_heartbeat(launch, clock, component.run(), lambda: component.feedback or str(component.state))
+    with strays_told(lambda line, _task: component.publish_event(component.name, line, LogLevel.WARNING)):
+        await run_with_heartbeat(launch, clock, component.run(), lambda: component.feedback or str(component.state))
 
 
 async def run_with_heartbeat(

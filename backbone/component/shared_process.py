@@ -38,7 +38,9 @@ from backbone.component.membership import (
     ProcessQuestion,
     process_address,
 )
+from backbone.component.messages import LogLevel
 from backbone.component.process import exit_code_of, run_to_end, run_with_heartbeat
+from backbone.component.stray_faults import strays_told
 from backbone.waiting import end_tasks, only_bugs
 from backbone.wire import Envelope, Message, UnknownMessage
 
@@ -126,6 +128,14 @@ class SharedProcess:
         living = [self._members[life] for life in self._lives]
         return {member.launch.name: member.component for member in living if member.component is not None}
 
+    def tell(self, fault: str, task: str) -> None:
+        """Tell a stray fault in the story of the member whose task it was; if it was no member's, in that of each."""
+        members = self.members()
+        own = members.get(task.partition(":")[0])
+        for one in members.values() if own is None else [own]:
+            of_whom = f"in {self._launch.process}: " if own is None and len(members) > 1 else ""
+            one.publish_event(one.name, f"{of_whom}{fault}", LogLevel.WARNING)
+
     # ------------------------------------------------------------------ questions
     async def _answer(self, asked: Envelope[Message]) -> Message:
         if asked.source != self._launch.requester:
@@ -205,7 +215,8 @@ async def _live(launch: Launch) -> None:
         shared = SharedProcess(launch, session.join, clock, os.getpid())
         for number in (signal.SIGTERM, signal.SIGINT):
             asyncio.get_running_loop().add_signal_handler(number, shared.end)
-        await run_with_heartbeat(launch, clock, shared.run())
+        with strays_told(shared.tell):
+            await run_with_heartbeat(launch, clock, shared.run())
     finally:
         await session.close()
 

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
+import msgspec
 import pytest
 from in_process_zygote import InProcessZygote
 
@@ -328,3 +329,27 @@ def test_admission_may_be_asked_twice_and_a_name_lives_once(local_mission: Calla
             await bus.close()
 
     run_virtual(main())
+
+
+@pytest.mark.parametrize(("task", "told"), [("radio:act", ["radio"]), ("Task-7", ["radio", "scout1"])])
+def test_a_stray_fault_is_told_by_the_member_whose_task_it_was_or_by_all(
+    local_mission: Callable, task: str, told: list[str]
+) -> None:
+    async def body() -> None:
+        async with local_mission() as network:
+            own = msgspec.structs.replace(launch("Quiet", "pool"), requester=CREATOR)
+            shared = SharedProcess(own, network.join, VirtualClock(), 7)
+            running = asyncio.create_task(shared.run())
+            bus = network.join(CREATOR, VirtualClock())
+            await VirtualClock().sleep_s(0.1)
+            for life, name in enumerate(("radio", "scout1")):
+                await bus.ask(shared.address, BeginMember(launch("Quiet", name), life), MemberBegun, within_s=1.0)
+            await VirtualClock().sleep_s(1.0)
+            shared.tell("coroutine 'drive' was never awaited", task)
+            stories = {name: member.story.of() for name, member in shared.members().items()}
+            assert [name for name in sorted(stories) if "never awaited" in str(stories[name])] == told
+            shared.end("over")
+            await running
+            await bus.close()
+
+    run_virtual(body())
