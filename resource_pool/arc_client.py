@@ -232,6 +232,8 @@ class ArcClient:
         try:
             return await self._ask(command)
         except UnknownMessage as unknown:
+            if "schema" not in unknown.facts:  # the RC refused it, not the ARC
+                raise
             raise NoSuchAction(f"{self.arc} has no command {command.word()}", command=command.word()) from unknown
 
     async def give(self, word: str, values: Mapping[str, object], role: str = "") -> Applied:

@@ -162,7 +162,8 @@ class ResourceController(Component[R], Generic[R]):
         When: for each command of a present hold; cancelled when the hold ends. What: return the applied values, clipped
         to the hardware's limits, with units in their names. Raise ``HardwareFault`` if the hardware does not obey.
         """
-        raise UnknownMessage(f"{self.name} declares {order.word()} and does not obey it", arc=hold.arc)
+        told = f"{self.name} declares {order.word()} and does not obey it"
+        raise UnknownMessage(told, remedy=f"Obey it in {type(self).__name__}.obey, or remove it.", arc=hold.arc)
 
     async def command(self, asked: Envelope[Message]) -> Message:
         """Admit one of ``commands`` and carry it out. Override for messages with another answer than ``Applied``."""

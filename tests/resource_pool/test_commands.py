@@ -12,7 +12,7 @@ from pool_on_local_network import TwoLampsArc, a_pool
 
 from backbone.bus.clock import run_virtual
 from backbone.component.abilities import UNLIMITED, ValueKind, unit_of
-from backbone.wire import Message
+from backbone.wire import Message, UnknownMessage
 from resource_pool.arcs.drive import DriveArc
 from resource_pool.commands import Command, Drive, Halt, Jump, Move, SwitchTransmitter, WrongCommand, command_of
 from resource_pool.messages import NoSuchAction, SwappedOut
@@ -143,6 +143,21 @@ def test_a_command_of_a_device_passes_by_class_and_by_word(local_mission: Any) -
                 await arc.give("blink", {})
             with pytest.raises(NoSuchAction, match="no command switch_transmitter"):
                 await arc.command(SwitchTransmitter(True, "video"))
+
+    run_virtual(scene())
+
+
+def test_a_command_that_an_rc_declares_and_does_not_obey_is_refused_with_the_name_of_its_class(
+    local_mission: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scene() -> None:
+        async with a_pool(local_mission, ["scout1", "radio", "lamp1"]) as pool:
+            arc = await pool.arc(await pool.owner("walker"), "lit_drive", "scout1")
+            await arc.wait_granted()
+            monkeypatch.delattr(Lamp, "obey")
+            with pytest.raises(UnknownMessage, match="lamp1 declares shine and does not obey it") as refused:
+                await arc.command(Shine(0.25))
+            assert "Lamp.obey" in refused.value.remedy
 
     run_virtual(scene())
 
