@@ -22,7 +22,7 @@ from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
 from backbone.component.messages import LogLevel
 from backbone.component.stray_faults import strays_told
-from backbone.errors import BackboneError, Refusal, code_of, complaint, revive
+from backbone.errors import BackboneError, Refusal, code_of, complaint, own_place, revive
 from backbone.printable_text import printable
 from backbone.waiting import end_tasks
 
@@ -71,7 +71,9 @@ def exit_code_of(error: BaseException, address: str) -> int:
     log, pid = logging.getLogger(__name__), os.getpid()
     match error:
         case Refusal():
-            log.error(_REFUSED, pid, address, code_of(error), error.detail, error.remedy)
+            place = own_place(error)
+            detail = f"{error.detail} ({place})" if place else error.detail
+            log.error(_REFUSED, pid, address, code_of(error), detail, error.remedy)
             return EXIT_REFUSED
         case BackboneError():
             log.error("process %d: %s ended: %s: %s", pid, address, type(error).__name__, error)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 
 import msgspec
 import pytest
@@ -14,6 +15,7 @@ from backbone.component.messages import (
     LifeState,
 )
 from backbone.component.own_tasks import TASKS_END_WITHIN_S
+from backbone.component.process import EXIT_REFUSED, cause_in_log, exit_code_of, refusal_in_log
 from backbone.component.story import MAX_FEEDBACK_LENGTH
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
@@ -307,3 +309,14 @@ def test_after_a_bug_a_drain_that_never_returns_does_not_hold_up_the_end(ordered
         assert stage.observed[-1] == "no token"
 
     live(law())
+
+
+def test_a_refusal_that_ends_a_component_is_told_with_the_line_of_its_code(caplog: pytest.LogCaptureFixture) -> None:
+    with pytest.raises(TooSteep) as raised:
+        raise TooSteep("45 degrees")
+    assert exit_code_of(raised.value, TOWER) == EXIT_REFUSED
+    lines, place = [f" ERROR x: {record.getMessage()}" for record in caplog.records], f"({__file__}, line "
+    assert cause_in_log(lines, TOWER, os.getpid()).startswith(f"45 degrees {place}")
+    found = refusal_in_log(lines, TOWER)
+    assert found is not None
+    assert found.detail.startswith(f"45 degrees {place}")
