@@ -23,6 +23,7 @@ _LENGTHS = {"minLength": "at least", "maxLength": "at most"}
 _META = {"minimum": "ge", "exclusiveMinimum": "gt", "maximum": "le", "exclusiveMaximum": "lt"}
 _META |= {"pattern": "pattern", "minLength": "min_length", "maxLength": "max_length"}
 _PEOPLE = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
+_PEOPLE |= {"array": "a list, which no mission file gives", "object": "a struct, which no mission file gives"}
 _TYPES = {"number": float, "integer": int, "string": str, "boolean": bool, "null": None}
 
 

@@ -122,6 +122,12 @@ def test_a_value_that_only_the_class_can_judge_is_judged_by_it(
     assert "own mine refuses its parameters" in fault.message
 
 
+def test_a_list_is_refused_with_the_reason_that_no_value_will_do(modules: Path) -> None:
+    (modules / "own_list.py").write_text(GOOD.replace("float = 1.0", "list[float] = []"))
+    [fault] = faults_in(modules, with_own_type("own_list:Own", depth_m="1,2"))
+    assert "a list, which no mission file gives" in fault.remedy
+
+
 def test_a_class_that_ends_its_process_when_it_judges_holds_nothing_up(modules: Path) -> None:
     rule = "    def __post_init__(self):\n        import os\n        os._exit(1)\n\nclass Own"
     (modules / "own_judge.py").write_text(GOOD.replace("\nclass Own", rule))
@@ -272,7 +278,11 @@ def test_facts_of_a_type_name_what_it_takes_for_people() -> None:
         b: list[str] = []
         c: bool = True
 
-    assert [one.legal_values for one in parameters_of(Kinds)] == ["integer or null", "array", "true or false"]
+    assert [one.legal_values for one in parameters_of(Kinds)] == [
+        "integer or null",
+        "a list, which no mission file gives",
+        "true or false",
+    ]
     assert [one.summary for one in parameters_of(Kinds)][2] == "boolean, default true"
     assert [one.accepts(None) for one in parameters_of(Kinds)] == [True, False, False]
 
