@@ -6,11 +6,12 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import msgspec
 
+from backbone.component.abilities import Abilities
 from backbone.component.class_faults import class_faults
 from backbone.component.component import Component
 from backbone.component.field_docs import field_docs
@@ -43,12 +44,22 @@ def facts_of(asked: str) -> ClassFacts:
     if faults := "; ".join(class_faults(found)):
         return ClassFacts(failure=faults)
     try:
-        return _described(found, driver)
+        facts = _described(found, driver)
     except Refusal as error:
         return ClassFacts(failure=error.detail)
     except Exception as error:  # a type of a parameter without a schema, or a hook of the class with a bug
         told = _without_schema(found) or _told(error)
         return ClassFacts(failure=f"its parameters or abilities cannot be listed: {told}")
+    limits = _limits_faults(getattr(found, "limits", {}), facts.abilities)
+    return ClassFacts(failure=limits) if limits else facts
+
+
+def _limits_faults(limits: Mapping[str, tuple[float, float]], abilities: Abilities) -> str:
+    """Return the limits that narrow no field of a command, so that the hardware would get values beyond them."""
+    fields = {field.name for command in abilities.commands for field in command.fields}
+    of_nothing = [f"limits has {name!r}, which no command has" for name in limits if name not in fields]
+    empty = [f"limits of {name}: {least:g} is above {most:g}" for name, (least, most) in limits.items() if least > most]
+    return "; ".join(of_nothing + empty)
 
 
 def _told(error: Exception) -> str:

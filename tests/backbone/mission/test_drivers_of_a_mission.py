@@ -140,3 +140,51 @@ def test_options_of_a_driver_of_ones_own_are_checked(own: Path) -> None:
 def test_drivers_on_other_machines_are_not_looked_for_here(own: Path) -> None:
     elsewhere = ('address="127.0.0.1"', 'address="192.0.2.1"')
     read_text(own, changed(elsewhere, (RADIO, f'{RADIO} driver="not_here.at_all:Radio"')))
+
+
+COMMANDS = """
+import msgspec
+from backbone.wire import Message
+from resource_pool.commands import Command, Move as ShippedMove
+from resource_pool.resource_controller import RcParameters, ResourceController
+
+class Turn(Command, frozen=True):
+    angle_rad: float = 0.0
+
+class Move(Command, frozen=True):
+    pass
+
+class Connect(Command, frozen=True):
+    pass
+
+class Degrees(msgspec.Struct):
+    pass
+
+class Table(ResourceController[RcParameters]):
+    commands = {commands}
+    limits = {limits}
+"""
+
+
+@pytest.mark.parametrize(
+    ("commands", "limits", "message"),
+    [
+        ("Turn", "{'angle_rad': (-1.0, 1.0)}", ""),
+        ("Turn", "{'angel_rad': (-1.0, 1.0)}", "limits has 'angel_rad', which no command has"),
+        ("Turn", "{'angle_rad': (1.0, -1.0)}", "limits of angle_rad: 1 is above -1"),
+    ],
+    ids=["right", "name", "empty"],
+)
+def test_commands_and_limits_that_cannot_work_are_refused(
+    own: Path, commands: str, limits: str, message: str, request: pytest.FixtureRequest
+) -> None:
+    """Else a robot drives beyond its limits."""
+    module = f"own_table_{request.node.callspec.id}"
+    (own / f"{module}.py").write_text(COMMANDS.format(commands=commands, limits=limits))
+    table = f'<type name="table" class="{module}:Table" subsystem="resource_pool"/>'
+    text = changed(("  </types>", f"{table}</types>"))
+    if not message:
+        read_text(own, text)
+        return
+    [fault] = faults_in(own, text)
+    assert message.replace("own_table", module) in fault.message
