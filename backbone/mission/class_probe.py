@@ -6,20 +6,21 @@ import importlib
 import inspect
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import msgspec
 
 from backbone.component.abilities import Abilities
 from backbone.component.class_faults import class_faults
-from backbone.component.component import Component
+from backbone.component.component import AnyComponent, Component
 from backbone.component.field_docs import field_docs
+from backbone.component.messages import CommonQuestion
 from backbone.errors import Refusal, complaint, own_place
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import PLANNER, ClassFacts, ParameterFacts, Question, parameters_of
 from backbone.scheduling.own_planner import load_planner
-from backbone.wire import kinds_of
+from backbone.wire import Message, kinds_of, schema_of
 
 BY_CLASS_ALONE = ("multipleOf", "format", "contentEncoding")  # rules of a schema that ``ParameterFacts`` lacks
 ASK_POSE = "AskPose"  # the question to localizers, which the resource pool declares
@@ -41,7 +42,7 @@ def facts_of(asked: str) -> ClassFacts:
         return ClassFacts(failure=f"its module cannot be imported: {_told(error)}")
     if not (isinstance(found, type) and issubclass(found, Component)):
         return ClassFacts(failure="it is no component: it does not derive from backbone.component.component:Component")
-    if faults := "; ".join(class_faults(found)):
+    if faults := "; ".join(class_faults(found)) or _commands_fault(found):
         return ClassFacts(failure=faults)
     try:
         facts = _described(found, driver)
@@ -52,6 +53,20 @@ def facts_of(asked: str) -> ClassFacts:
         return ClassFacts(failure=f"its parameters or abilities cannot be listed: {told}")
     limits = _limits_faults(getattr(found, "limits", {}), facts.abilities)
     return ClassFacts(failure=limits) if limits else facts
+
+
+def _commands_fault(found: type[AnyComponent]) -> str:
+    """Return the first command that is no message, or has the name of another message to the same component."""
+    declared = getattr(found, "commands", None) or ()
+    commands = declared if isinstance(declared, Collection) else kinds_of(declared)
+    asked = CommonQuestion if found.accepts is None else CommonQuestion | found.accepts
+    schemas = {schema_of(kind): kind for kind in kinds_of(asked) if kind not in commands}
+    for kind in commands:
+        if not (isinstance(kind, type) and issubclass(kind, Message)):
+            return f"commands has {getattr(kind, '__name__', kind)}, which is no command; derive it from Command"
+        if (other := schemas.setdefault(schema_of(kind), kind)) is not kind:
+            return f"commands has {kind.__module__}:{kind.__name__}, and {other.__module__} has a message of this name"
+    return ""
 
 
 def _limits_faults(limits: Mapping[str, tuple[float, float]], abilities: Abilities) -> str:
@@ -66,7 +81,7 @@ def _told(error: Exception) -> str:
     return complaint(error if own_place(error) else error.with_traceback(None))  # no place in our own code
 
 
-def _without_schema(found: type[Component[Any]]) -> str:
+def _without_schema(found: type[AnyComponent]) -> str:
     """Return the first parameter of a type that no message carries; empty: there is none."""
     try:
         for field in msgspec.structs.fields(found.parameters_type):

@@ -172,13 +172,16 @@ class Table(ResourceController[RcParameters]):
         ("Turn", "{'angle_rad': (-1.0, 1.0)}", ""),
         ("Turn", "{'angel_rad': (-1.0, 1.0)}", "limits has 'angel_rad', which no command has"),
         ("Turn", "{'angle_rad': (1.0, -1.0)}", "limits of angle_rad: 1 is above -1"),
+        ("Turn | Degrees", "{}", "commands has Degrees, which is no command; derive it from Command"),
+        ("Move | ShippedMove", "{}", "resource_pool.commands:Move, and own_table has a message of this name"),
+        ("Turn | Connect", "{}", "commands has own_table:Connect, and backbone.rc_manager.messages has a message"),
     ],
-    ids=["right", "name", "empty"],
+    ids=["right", "name", "empty", "struct", "twice", "base"],
 )
 def test_commands_and_limits_that_cannot_work_are_refused(
     own: Path, commands: str, limits: str, message: str, request: pytest.FixtureRequest
 ) -> None:
-    """Else a robot drives beyond its limits."""
+    """Else a robot drives beyond its limits, or its RC ends at its start."""
     module = f"own_table_{request.node.callspec.id}"
     (own / f"{module}.py").write_text(COMMANDS.format(commands=commands, limits=limits))
     table = f'<type name="table" class="{module}:Table" subsystem="resource_pool"/>'
