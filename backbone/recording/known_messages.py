@@ -13,6 +13,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from importlib.metadata import entry_points
 
+from backbone.errors import complaint
 from backbone.wire import Message, schema_of
 
 GROUP = "scout_backbone.messages"
@@ -29,22 +30,19 @@ def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
         modules: Further modules, such as those of the mission's component types; a module that cannot be imported here
             is skipped.
     """
-    packages: set[str] = set()
-    for entry in entry_points(group=GROUP):
-        entry.load()
-        packages.add(entry.module.partition(".")[0])
-    for module in modules:
+    installed = {entry.module: None for entry in entry_points(group=GROUP)}
+    packages = {module.partition(".")[0] for module in installed}
+    for module in (*installed, *modules):
         try:
             importlib.import_module(module)
         except Exception as error:  # a module that is being written raises anything
-            log.warning("messages of %s are recorded without names: %s: %s", module, type(error).__name__, error)
+            log.warning("messages of %s are recorded without names: %s", module, complaint(error))
     named: dict[str, dict[str, type[Message]]] = defaultdict(dict)
     for kind in _derived(Message):
         named[schema_of(kind)][f"{kind.__module__}:{kind.__qualname__}"] = kind
     known: dict[str, type[Message]] = {}
     for schema, kinds in named.items():
-        installed = [path for path in kinds if path.partition(".")[0] in packages]
-        only = installed or list(kinds)
+        only = [path for path in kinds if path.partition(".")[0] in packages] or list(kinds)
         if len(only) == 1:  # else the names of one class would stand beside the values of the other
             known[schema] = kinds[only[0]]
         if len(kinds) > 1:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from backbone.recording.known_messages import message_classes
+from backbone.recording.known_messages import GROUP, message_classes
 from resource_pool.messages import Frame
 
 
@@ -41,3 +41,18 @@ def test_a_class_of_ones_own_takes_no_name_from_another(
     assert found["BoxLost/1"].__module__ == "b_box"
     assert "messages of a_box:Frame are recorded without names" in caplog.text
     assert "messages of a_box:BoxFound and b_box:BoxFound are recorded without names" in caplog.text
+
+
+def test_an_installed_package_that_cannot_be_imported_costs_only_its_own_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    about = tmp_path / "sensors-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: sensors\nVersion: 1\n")
+    (about / "entry_points.txt").write_text(f"[{GROUP}]\nsensors = sensors_in_work\n")
+    (tmp_path / "sensors_in_work.py").write_text("\nraise OSError('libsensor.so: cannot open')")
+    monkeypatch.syspath_prepend(tmp_path)
+    with caplog.at_level(logging.WARNING):
+        assert message_classes()["Frame/1"] is Frame
+    told = f"OSError: libsensor.so: cannot open ({tmp_path / 'sensors_in_work.py'}, line 2)"
+    assert f"messages of sensors_in_work are recorded without names: {told}" in caplog.text
