@@ -7,6 +7,7 @@ reads these schemas in no other encoding.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
@@ -15,7 +16,10 @@ from typing import Any, Protocol
 from foxglove import Schema
 from foxglove.messages import Timestamp
 
+from backbone.errors import complaint
 from backbone.wire import Message
+
+log = logging.getLogger(__name__)
 
 GROUP = "scout_backbone.foxglove"
 ENCODING = "protobuf"
@@ -52,9 +56,14 @@ Translations = Mapping[type[Message], Callable[[Any], Iterable[WellKnown]]]
 
 
 def installed() -> Translations:
-    """Return the translations of the installed packages."""
-    tables: list[Translations] = [entry.load() for entry in entry_points(group=GROUP)]
-    return {kind: translation for table in tables for kind, translation in table.items()}
+    """Return the translations of the installed packages; a table that cannot be loaded is left out."""
+    found: dict[type[Message], Callable[[Any], Iterable[WellKnown]]] = {}
+    for entry in entry_points(group=GROUP):
+        try:
+            found |= entry.load()
+        except Exception as error:  # a module that is being written raises anything
+            log.warning("the translations of %s are left out: %s", entry.name, complaint(error))
+    return found
 
 
 def shown_as(message: Message | None, translations: Translations) -> list[WellKnown]:

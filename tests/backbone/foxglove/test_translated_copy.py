@@ -22,7 +22,7 @@ from message_catalogue import honest_body, limit_bodies
 
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.foxglove.translated_copy import write_copy
-from backbone.foxglove.well_known import installed, shown_as
+from backbone.foxglove.well_known import GROUP, installed, shown_as
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import NotOfMessages, Recording
@@ -207,3 +207,17 @@ def test_the_command_writes_a_new_file_and_tells_what_it_lacks(tmp_path: Path) -
     assert [topic for topic, *_ in well_known(io.BytesIO(to.read_bytes()))] == ["/robots/scout1/camera"]
     again = scout_backbone("recording", "foxglove", str(path), str(to))
     assert (again.returncode, "exists" in again.stderr) == (2, True), again.stderr
+
+
+def test_a_package_whose_translations_cannot_be_loaded_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    about = tmp_path / "gauges-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: gauges\nVersion: 1\n")
+    (about / "entry_points.txt").write_text(f"[{GROUP}]\ngauges = gauges_in_work:TRANSLATIONS\n")
+    (tmp_path / "gauges_in_work.py").write_text("\nraise OSError('no gauge')")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert installed() == TRANSLATIONS
+    told = f"OSError: no gauge ({tmp_path / 'gauges_in_work.py'}, line 2)"
+    assert f"the translations of gauges are left out: {told}" in caplog.text
