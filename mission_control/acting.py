@@ -7,19 +7,23 @@ again.
 from __future__ import annotations
 
 import asyncio
+import inspect
 import logging
 from collections.abc import Coroutine
 from typing import Protocol
 
 from backbone.bus.interface import Clock
+from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, OutcomeUnknown
 from mission_control.behavior_hooks import BehaviorHooks
-from mission_control.child_keeper import AGAIN_AFTER_S, end_task
+from mission_control.child_keeper import AGAIN_AFTER_S
 from mission_control.gated_bus import GatedBus
 from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import ArcClient, EmergencyStopped, StaleEpoch, SwappedOut
 
 log = logging.getLogger(__name__)
+
+CANCELLED_WITHIN_S = 0.1  # chosen: half the time in which a behavior must note the end of its grant; machine seconds
 
 
 class Actor(Protocol):
@@ -39,6 +43,9 @@ class Actor(Protocol):
 
     def report(self, feedback: str) -> None:
         """Set the feedback."""
+
+    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
+        """Add an event to the story and to the mission's log."""
 
 
 class Acting:
@@ -68,9 +75,17 @@ class Acting:
         self._task = self._actor.begin_task(self._act(arc), "act")
 
     async def stop(self) -> None:
-        """Cancel the task and wait until it has ended."""
+        """Cancel the task and wait until it has ended; if it goes on, that is told with the place of ``act``."""
         task, self._task = self._task, None
-        await end_task(task)
+        if task is None or task is asyncio.current_task():
+            return
+        task.cancel()
+        _ended, goes_on = await asyncio.wait({task}, timeout=CANCELLED_WITHIN_S)
+        if goes_on:
+            act = inspect.unwrap(type(self._hooks).act).__code__
+            told = f"act goes on after its cancellation ({act.co_filename}, line {act.co_firstlineno})"
+            self._actor.publish_event(self._actor.name, told, LogLevel.WARNING)
+            await asyncio.wait({task})
 
     def drop(self) -> None:
         """Cancel the task without waiting for its end."""

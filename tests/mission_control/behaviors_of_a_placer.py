@@ -84,6 +84,16 @@ class Starter(Driver):
         await self.arc.halt()
 
 
+class Stubborn(Driver):
+    """Goes on for a while after each cancellation."""
+
+    async def act(self) -> None:
+        try:
+            await super().act()
+        finally:
+            await self.clock.sleep_s(0.5)
+
+
 class Spectator(Behavior[Any]):
     """Only looks."""
 
@@ -95,6 +105,7 @@ CLASSES: dict[str, type[Component[Any]]] = {
     "sequence": Sequence,
     "driver": Driver,
     "starter": Starter,
+    "stubborn": Stubborn,
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from behaviors_of_a_placer import ARC, node, root
+from behaviors_of_a_placer import ARC, Stubborn, node, root
 from fake_resource_pool import FakePlacer, Run
 
 from backbone.errors import BackboneError, ReplyTimeout
@@ -171,5 +171,24 @@ def test_told_to_stop_it_gives_its_arc_back(placer_world: Run) -> None:
         await placer.wait(lambda: not placer.components)
         assert arc.released
         assert placer.ended == ["watch1-capture"]
+
+    placer_world(scene)
+
+
+@pytest.mark.parametrize(("kind", "times"), [("driver", 0), ("stubborn", 1)])
+def test_an_act_that_goes_on_after_its_cancellation_is_told_with_its_place(
+    placer_world: Run, kind: str, times: int
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        own = await root(placer, node("own", kind, arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["own-capture"]
+        await arc.grant()
+        await placer.clock.sleep_s(1.0)
+        await arc.suspend()
+        await placer.clock.sleep_s(1.0)
+        place = f"({Stubborn.act.__code__.co_filename}, line {Stubborn.act.__code__.co_firstlineno})"
+        told = [event.what for event in own.story.of("own") if "cancellation" in event.what]
+        assert told == [f"act goes on after its cancellation {place}"] * times
 
     placer_world(scene)
