@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+from backbone.mission.class_facts import ANY_ARC
 from mission_control.behavior_tree import ArcNeed
 from mission_control.children import Children, Decision
 from mission_control.messages import BehaviorStatus
@@ -18,12 +19,13 @@ class BehaviorHooks:
     """Hooks of a behavior: event handlers and decisions."""
 
     needs_arc: ClassVar[str] = ""
-    """Kind of ARC like which the behavior needs one. A class that overrides ``see`` and sets no kind needs pictures."""
+    """Kind of ARC like which the behavior needs one. A class that overrides ``see`` and sets no kind needs pictures;
+    one that overrides ``act``, an ARC of any kind."""
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        if "see" in vars(cls) and not cls.needs_arc and "needs_arc" not in vars(cls):
-            cls.needs_arc = "capture"
+        if "needs_arc" not in vars(cls) and cls.needs_arc in ("", ANY_ARC):
+            cls.needs_arc = "capture" if "see" in vars(cls) else ANY_ARC if "act" in vars(cls) else cls.needs_arc
 
     async def start(self) -> None:
         """Prepare.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from backbone.component.abilities import NO_ABILITIES
 from backbone.component_database.messages import Multiplicity
 from backbone.mission.behavior_orders import TREE_PARAMETERS
+from backbone.mission.class_facts import ANY_ARC
 from backbone.mission.document import Element
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.parameter_checks import check_class_parameters
@@ -101,7 +102,9 @@ def _check_needed(behavior: Element, needed: str, tables: Tables, report: Report
         report.fault(
             behavior.place,
             f"{behavior.text('type')} {behavior.text('name')} has no ARC, and needs one",
-            f'Write into it <arc kind="{needed}" minimum-runtime-s="5"/>, or one of a similar kind',
+            'Write into it <arc kind="…" minimum-runtime-s="5"/>; without an ARC act does not run'
+            if needed == ANY_ARC
+            else f'Write into it <arc kind="{needed}" minimum-runtime-s="5"/>, or one of a similar kind',
         )
     claimed = None if arc is None else tables.facts_of(arc.text("kind"))
     if arc is None or claimed is None or like is None or claimed.abilities == NO_ABILITIES:

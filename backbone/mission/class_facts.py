@@ -16,6 +16,7 @@ from backbone.component.abilities import NO_ABILITIES, Abilities
 from backbone.spoken import counted
 
 SHIPPED = "shipped_classes.json"
+ANY_ARC = "any"
 PLANNER = "planner"  # the RC manager's parameter that names a planner of one's own
 
 _LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
@@ -105,7 +106,8 @@ class ClassFacts(msgspec.Struct, frozen=True):
         has_rules: Whether it has rules for its parameters besides their types; only the class itself can check these.
         children: Fewest and most children of a behavior; None: any number.
         may_claim: False: a behavior of this class has no ARC.
-        needs_arc: Kind of ARC like which a behavior of this class needs one; empty: it needs none.
+        needs_arc: Kind of ARC like which a behavior of this class needs one; ``ANY_ARC``: it needs one of any kind;
+            empty: it needs none.
         failure: Why the facts are unknown; empty: they are known.
         abilities: The commands that its components obey, and the values that they report.
         given: Parameters that other elements and attributes of the mission file set.

@@ -47,6 +47,39 @@ class LooksSometimes(Watcher):
     needs_arc = ""
 
 
+class Bellringer(Behavior[BehaviorParameters]):
+    async def act(self) -> None:
+        pass
+
+
+class Lookout(Bellringer):
+    def see(self, frame: Frame) -> None:
+        pass
+
+
+class Idler(Bellringer):
+    needs_arc = ""
+
+
+def test_a_class_of_ones_own_that_acts_needs_an_arc_unless_it_says_otherwise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert facts_of(f"{__name__}:Bellringer").needs_arc == "any"
+    assert facts_of(f"{__name__}:Lookout").needs_arc == "capture"
+    assert facts_of(f"{__name__}:Idler").needs_arc == ""
+    lines = ["from mission_control.behavior import Behavior", "class Own(Behavior):", "    async def act(self): ..."]
+    (tmp_path / "own_bell.py").write_text("\n".join(lines))
+    monkeypatch.syspath_prepend(tmp_path)
+    own = '<types><type name="bell" class="own_bell:Own" subsystem="mission_control"/>'
+    text = MISSION.replace("</behaviors>", '<behavior type="bell" name="ring" priority="1"/></behaviors>')
+    text = (
+        text.replace("<types>", own) if "<types>" in text else text.replace("<resources>", f"{own}</types><resources>")
+    )
+    [fault] = faults_in(tmp_path, text)
+    assert fault.message == "bell ring has no ARC, and needs one"
+    assert 'kind="…"' in fault.remedy
+
+
 def test_a_class_of_ones_own_that_sees_needs_pictures_unless_it_says_otherwise() -> None:
     assert facts_of(f"{__name__}:Watcher").needs_arc == "capture"
     assert facts_of(f"{__name__}:LooksSometimes").needs_arc == ""
