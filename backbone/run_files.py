@@ -242,8 +242,18 @@ def secret(run_file: RunFile) -> str:
 
 
 def find_all() -> list[RunFile]:
-    """Return the missions that are up on this machine, sorted by name."""
-    found = (_read(folder / FILE_NAME) for folder in sorted(_directory().iterdir()) if is_legal(folder.name))
+    """Return the missions that are up on this machine, sorted by name; folders that cannot be read are left out.
+
+    Raises:
+        UnsafeDirectory: Another user could write files there.
+        RunFolderUnusable: The system refused to list the folders.
+    """
+    directory = _directory()
+    try:
+        folders = sorted(directory.iterdir())
+    except OSError as error:
+        raise _unusable(directory, error) from error
+    found = (_read(folder / FILE_NAME) for folder in folders if is_legal(folder.name))
     return [run_file for run_file in found if run_file is not None and _is_fresh(run_file)]
 
 
@@ -298,10 +308,10 @@ def _check_private(directory: Path) -> None:
 
 
 def _read(path: Path) -> RunFile | None:
-    """Return the run file at this path; None if it is missing or from another release."""
+    """Return the run file at this path; None if it is missing, unreadable, or from another release."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=RunFile)
-    except (FileNotFoundError, NotADirectoryError, msgspec.DecodeError):
+    except (OSError, msgspec.DecodeError):  # one folder of another account must not hide all missions
         return None
 
 

@@ -1,8 +1,10 @@
 """Missions of this machine are found by name, and only while their launcher lives."""
 
+import errno
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -78,6 +80,22 @@ def test_a_broken_file_is_passed_over() -> None:
     path = run_files.write(up("iros2001"))
     path.write_bytes(b"{")
     with pytest.raises(MissionNotUp):
+        run_files.find()
+
+
+def test_a_folder_that_cannot_be_read_hides_no_mission(runtime_directory: Path) -> None:
+    run_files.write(up("iros2001"))
+    (runtime_directory / "scout-backbone" / "loop").symlink_to("loop")
+    (runtime_directory / "scout-backbone" / "other" / run_files.FILE_NAME).mkdir(parents=True)
+    assert run_files.find().mission == "iros2001"
+
+
+def test_run_folders_that_cannot_be_listed_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(_folder: Path) -> Iterator[Path]:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", refused)
+    with pytest.raises(RunFolderUnusable, match="Permission denied"):
         run_files.find()
 
 
