@@ -144,9 +144,11 @@ def legal_name(value: str | None) -> str | None:
 
 
 def shown_name(value: str) -> str:
-    """Refuse a name that messages cannot contain, or that texts cannot show; for names of anything."""
-    if len(value) > LONGEST_NAME or not value.isprintable():
-        raise typer.BadParameter(f"write a name of at most {LONGEST_NAME} printable characters")
+    """Refuse a name that messages cannot contain, or that texts cannot show as it is; for names of anything."""
+    if len(value) > LONGEST_NAME or not value.isprintable() or value != value.strip():
+        raise typer.BadParameter(
+            f"write a name of at most {LONGEST_NAME} printable characters, the first and last of them no space"
+        )
     return value
 
 

@@ -66,7 +66,7 @@ def test_another_machines_mission_must_be_named() -> None:
     assert done.exit_code == 2
 
 
-@pytest.mark.parametrize("name", ["x" * 256, "a\nb", os.fsdecode(b"\xff")])
+@pytest.mark.parametrize("name", ["x" * 256, "a\nb", os.fsdecode(b"\xff"), " ", "anna "])
 @pytest.mark.parametrize("command", ["attach", "monitor"])
 def test_a_persons_name_that_no_message_can_contain_or_no_text_can_show_is_wrong_usage(command: str, name: str) -> None:
     done = CliRunner().invoke(app, [command, "--json", "--user", name])

@@ -148,14 +148,16 @@ def read_operator(text: str) -> tuple[str, int]:
     """Return an operator's name and priority.
 
     Raises:
-        WrongOperator: It is not ``NAME=PRIORITY``, with a whole number from 0 of at most nine digits.
+        WrongOperator: It is not ``NAME=PRIORITY``, with a printable name that neither begins nor ends with a space, and
+            a whole number from 0 of at most nine digits.
 
     Example:
         >>> read_operator("anna=120")
         ('anna', 120)
     """
     user, _equals, priority = text.rpartition("=")
-    if not 0 < len(user) <= MAX_USER or not (priority.isdecimal() and len(priority) < 10):
+    is_name = 0 < len(user) <= MAX_USER and user.isprintable() and user == user.strip()
+    if not is_name or not (priority.isdecimal() and len(priority) < 10):
         raise WrongOperator(f"{text!r} is not NAME=PRIORITY, such as anna=120")
     return user, int(priority)
 

@@ -225,7 +225,9 @@ def test_tokens_are_one_for_all_or_one_for_each() -> None:
     assert len({new_token() for _ in range(100)}) == 100
 
 
-@pytest.mark.parametrize("text", ["anna", "=3", "anna=", "anna=-1", "anna=x", "a" * 64 + "=1"])
+@pytest.mark.parametrize(
+    "text", ["anna", "=3", "anna=", "anna=-1", "anna=x", "a" * 64 + "=1", " =1", "anna =1", "\x1b[2Ja=1"]
+)
 def test_an_operator_is_a_name_and_a_priority(text: str) -> None:
     with pytest.raises(WrongOperator, match="anna=120"):
         read_operator(text)
