@@ -135,13 +135,20 @@ def new_token() -> str:
 
 
 def new_rights(operators: Iterable[tuple[str, int]], priority: int) -> dict[str, TokenRights]:
-    """Return new tokens: one for each operator with an own priority, or one for all."""
+    """Return new tokens: one for each operator with an own priority, or one for all.
+
+    Raises:
+        WrongOperator: Two operators have one name.
+    """
     named = [TokenRights(user, own) for user, own in operators]
+    users = [granted.user for granted in named]
+    if twice := next((user for user in users if users.count(user) > 1), None):
+        raise WrongOperator(f"{twice} is there twice; give each operator a name of their own")
     return {new_token(): granted for granted in named or [TokenRights("", priority)]}
 
 
 class WrongOperator(ValueError):
-    """An operator is not written as ``NAME=PRIORITY``."""
+    """An operator is not written as ``NAME=PRIORITY``, or has the name of another one."""
 
 
 def read_operator(text: str) -> tuple[str, int]:

@@ -225,6 +225,11 @@ def test_tokens_are_one_for_all_or_one_for_each() -> None:
     assert len({new_token() for _ in range(100)}) == 100
 
 
+def test_two_operators_of_one_name_are_refused() -> None:
+    with pytest.raises(WrongOperator, match="anna is there twice"):
+        new_rights([("anna", 1), ("ben", 2), ("anna", 3)], 50)
+
+
 @pytest.mark.parametrize(
     "text", ["anna", "=3", "anna=", "anna=-1", "anna=x", "a" * 64 + "=1", " =1", "anna =1", "\x1b[2Ja=1"]
 )
