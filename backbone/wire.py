@@ -143,7 +143,7 @@ class WrongVersion(Refusal):
     """The schema is known, but not its version."""
 
     code = "wire.version"
-    remedy = "Run the same release of scout-backbone on every host."
+    remedy = "Run the same release of scout-backbone on every host; after an upgrade, bring the mission up anew."
 
 
 def _bounded(fact: Fact) -> Fact:

@@ -6,7 +6,7 @@ from typing import TypeVar, cast
 
 from backbone.bus.inbox import reply_reader_of
 from backbone.errors import NoResponder, Refusal, ReplyTimeout
-from backbone.wire import MalformedMessage, Message, Refused
+from backbone.wire import MalformedMessage, Message, Refused, WrongVersion
 
 Reply = TypeVar("Reply", bound=Message)
 
@@ -30,7 +30,7 @@ def read_answer(came: Came, address: str, question: Message, reply: type[Reply],
         Refusal: The component refused.
         NoResponder: The component is gone.
         ReplyTimeout: No answer came in time.
-        MalformedMessage: The answer has another class than ``reply``.
+        MalformedMessage: The answer has another class than ``reply``, or comes from another release.
     """
     what = type(question).__name__
     if came is None:
@@ -40,7 +40,9 @@ def read_answer(came: Came, address: str, question: Message, reply: type[Reply],
     try:
         body = reply_reader_of(reply).read(came).body
     except Refusal as unreadable:
-        raise MalformedMessage(f"{address} answered {what} with another message: {unreadable.detail}") from unreadable
+        detail = f"{address} answered {what} with another message: {unreadable.detail}"
+        remedy = unreadable.remedy if isinstance(unreadable, WrongVersion) else None
+        raise MalformedMessage(detail, remedy=remedy) from unreadable
     if isinstance(body, Refused):
         raise body.revive()
     return cast("Reply", body)
