@@ -145,5 +145,6 @@ async def end_mission(bus: Bus, *, at_once: bool = False) -> MissionEnding:
 
     Raises:
         LinkError: The launcher did not answer.
+        Refusal: The launcher is of another release.
     """
     return await bus.ask(LAUNCHER, EndMission(at_once), MissionEnding, within_s=LISTING_TIME_S)

@@ -16,7 +16,7 @@ from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.errors import LinkError
+from backbone.errors import LinkError, Refusal
 from backbone.launcher.bring_up import end_mission
 from backbone.launcher.core_launches import UpOptions
 from backbone.launcher.ending_messages import AwaitLastBranch, LastBranchOver
@@ -149,6 +149,9 @@ async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool)
             await first_of(_tell_last_branch(bus, ending.within_s / clock.rate + ASKED_S), ended.wait())
     except LinkError as error:
         say(f"the launcher does not answer: {error}")
+        return False
+    except Refusal as error:  # it is of another release
+        say(f"the launcher does not take the order: {error}")
         return False
     finally:
         await bus.close()

@@ -1,4 +1,4 @@
-"""``down`` of a mission that ends meanwhile by itself, or by another ``down``."""
+"""``down`` of a mission that ends meanwhile by itself, or by another ``down``, or is of another release."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from backbone import run_files
 from backbone.errors import HubUnreachable
 from backbone.launcher import detached
 from backbone.run_files import RunFile
+from backbone.wire import WrongVersion
 
 pytestmark = pytest.mark.processes
 
@@ -44,3 +45,31 @@ def test_a_launcher_that_ends_meanwhile_is_down(
     monkeypatch.setattr(run_files, "find", find)
     assert asyncio.run(detached.take_down("m")) == 0
     assert "mission m is down; its launcher has ended meanwhile" in capsys.readouterr().err
+
+
+def test_a_launcher_of_another_release_is_ended_by_a_signal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Speechless:
+        source = "ui_console/down-1"
+
+        @classmethod
+        async def open_when_up(cls, *_given: Any) -> Speechless:
+            return cls()
+
+        def publish(self, *_given: Any) -> None: ...
+
+        async def ask(self, *_given: Any, **_by_name: Any) -> Any:
+            raise WrongVersion("envelope version 1, but version 2 is expected")
+
+        async def close(self) -> None: ...
+
+    with subprocess.Popen(["sleep", "60"]) as launcher:
+        found = RunFile("m", "unixsock-stream/nowhere", launcher.pid, 0.0, 1.0, "base", "m.xml")
+        monkeypatch.setattr(detached, "ZenohBus", Speechless)
+        monkeypatch.setattr(run_files, "find", lambda _mission: found)
+        assert asyncio.run(detached.take_down("m")) == 0
+    told = capsys.readouterr().err
+    assert "does not take the order" in told
+    assert "bring the mission up anew" in told
+    assert "mission m is down; SIGTERM was enough" in told
