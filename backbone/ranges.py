@@ -28,6 +28,7 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct
 
 from backbone.naming import MAX_NAME_LENGTH
+from backbone.type_aliases import unaliased
 
 # ---------------------------------------------------------------------- how much
 MOST_ENTRIES = 65_536  # chosen: twice the leases of 10 000 ARCs on three RCs each
@@ -176,6 +177,7 @@ def wildness(value: object, depth: int = 0) -> str:
 @functools.cache
 def holds_values_of_any_kind(kind: Any) -> bool:
     """Return whether this type admits values of any kind, which types alone cannot check."""
+    kind = unaliased(kind)
     if isinstance(kind, type) and issubclass(kind, Struct):
         return bool(_fields_of_any_kind(kind))
     return kind is Any or any(map(holds_values_of_any_kind, typing.get_args(kind)))

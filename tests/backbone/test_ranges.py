@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
+import typing
 from typing import Any
 
 import msgspec
@@ -112,3 +114,14 @@ def unrefused(kind: type[Message]) -> list[str]:
             pass
         found.append(sample.name)
     return found
+
+
+@pytest.mark.skipif(sys.version_info < (3, 12), reason="Python 3.11 has no aliases that are objects")
+def test_an_alias_of_values_of_any_kind_does_not_let_wild_values_in() -> None:
+    alias: Any = getattr(typing, "TypeAliasType")  # noqa: B009  as 'type Table = dict[str, Any]' makes it
+    key: Any = typing.TypeVar("key")
+    table, keyed = alias("Table", dict[str, Any]), alias("Keyed", dict[key, Any], type_params=(key,))
+    for kind in (table, keyed[str], dict[str, table]):
+        holding = msgspec.defstruct("Holding", [("table", kind)], bases=(Message,), frozen=True, tag="Holding/1")
+        with pytest.raises(MalformedMessage, match="nan"):
+            Reader(holding).read(enveloped(holding({"speed": {"at": math.nan}})))
