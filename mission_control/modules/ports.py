@@ -24,6 +24,7 @@ import msgspec
 
 from backbone.errors import Refusal
 from backbone.naming import is_legal
+from backbone.type_aliases import unaliased
 
 
 class WrongDeclaration(Refusal):
@@ -137,13 +138,12 @@ def _port(declared: type[Ports], field: msgspec.structs.FieldInfo, hint: object)
 
 def _kind(hint: object) -> tuple[object, tuple[object, ...]]:
     """Return the class of a port's values and the marks beside it."""
-    marks: tuple[object, ...] = ()
+    hint = unaliased(hint)
     if typing.get_origin(hint) is Annotated:
-        hint, *beside = typing.get_args(hint)
-        marks = tuple(beside)
+        kind, inside = _kind(typing.get_args(hint)[0])
+        return kind, (*typing.get_args(hint)[1:], *inside)
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         given = [one for one in typing.get_args(hint) if one is not types.NoneType]
         if len(given) == 1:
-            kind, inside = _kind(given[0])
-            return kind, (*marks, *inside)
-    return hint, marks
+            return _kind(given[0])
+    return hint, ()

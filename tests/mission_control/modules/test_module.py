@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+import typing
 from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 import pytest
 from sample_modules import Counter, Doubler, Follower, Number, Sum, Summing
@@ -131,6 +134,21 @@ def test_a_state_without_a_default_is_refused_by_its_name() -> None:
 def test_a_mark_may_stand_inside_the_choice_of_nothing() -> None:
     assert ports_of(MarkInside) == (
         Port("number", "number", f"{Number.__module__}:Number", is_required=False, is_latest=True),
+    )
+
+
+@pytest.mark.skipif(sys.version_info < (3, 12), reason="Python 3.11 has no aliases that are objects")
+def test_a_port_of_an_alias_is_one_of_the_class_that_it_names() -> None:
+    alias: Any = getattr(typing, "TypeAliasType")  # noqa: B009  as 'type Just = Number' makes it
+    just, latest, perhaps = alias("Just", Number), alias("Latest", Annotated[Number, LATEST]), alias("P", Number | None)
+    fields = [("a", just), ("b", latest), ("c", Annotated[perhaps, LATEST], None), ("d", just | None, None)]
+    declared = msgspec.defstruct("Declared", fields, bases=(Ports,))
+    name = f"{Number.__module__}:Number"
+    assert ports_of(declared) == (
+        Port("a", "a", name),
+        Port("b", "b", name, is_latest=True),
+        Port("c", "c", name, is_required=False, is_latest=True),
+        Port("d", "d", name, is_required=False),
     )
 
 
