@@ -40,8 +40,7 @@ def threads_and_frozen(_number: int) -> tuple[str | None, str | None, int]:
 def test_other_processes_keep_to_one_core_and_look_through_what_lasts_once() -> None:
     found = run_all(threads_and_frozen, range(20), jobs=2)
     assert {(opencv, openblas) for opencv, openblas, _ in found} == {("1", "1")}
-    assert found[0][2] == 0
-    assert found[1][2] > 0
+    assert found[0][2] < found[1][2]  # an interpreter may begin with frozen objects
 
 
 @pytest.mark.processes
