@@ -47,7 +47,6 @@ from resource_pool.driver_adjusting import adjust_all
 from resource_pool.driver_exchange import DriverExchanges
 from resource_pool.driver_slot import DriverSlot
 from resource_pool.drivers.interface import (
-    AdjustableDriver,
     DriverSite,
     HardwareFault,
     build_driver,
@@ -313,7 +312,7 @@ class ResourceController(Component[R], Generic[R]):
         for_driver = changed & self.driver_parameters
         fixed = changed - self.driver_parameters - {"capacity"}
         drivers = [slot.proxy for slot in self._slots]
-        unable = [driver for driver in drivers if not isinstance(driver, AdjustableDriver)]
+        unable = [driver for driver in drivers if not hasattr(driver, "adjust")]
         if fixed or (for_driver and (unable or not drivers)):
             raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed or for_driver))} while it runs")
         if for_driver:

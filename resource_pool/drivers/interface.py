@@ -2,6 +2,9 @@
 
 The simulated drivers, a radio on a serial port and a grabber behind V4L2 all fit these protocols. A mission names a
 driver: one of ``BUILT_IN`` for its kind, or ``package.module:Class``.
+
+RCs ask ``hasattr`` for optional methods: a driver may pass calls on to another, and then ``isinstance`` with a protocol
+says no from Python 3.12 on.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar, cast, runtime_checkable
+from typing import Annotated, Any, Protocol, TypeVar, cast
 
 import msgspec
 
@@ -105,7 +108,6 @@ class RadioDriver(Protocol):
         """Close the device. When: once, last."""
 
 
-@runtime_checkable
 class AnsweringRadio(Protocol):
     """A radio on which robots reply."""
 
@@ -118,7 +120,6 @@ class AnsweringRadio(Protocol):
         """
 
 
-@runtime_checkable
 class AdjustableDriver(Protocol):
     """A driver that can apply changed options and RC parameters at run time."""
 
@@ -169,7 +170,6 @@ class FramegrabberDriver(Protocol):
         """Close the device. When: once, last."""
 
 
-@runtime_checkable
 class YieldingDriver(Protocol):
     """A framegrabber driver that delivers fewer pictures while its host is busy, and reports it by ``remark``."""
 
@@ -197,7 +197,6 @@ class MalformedReply(Refusal):
     remedy = "Check that robot and protocol are of one kind, and that no two robots have the same network id."
 
 
-@runtime_checkable
 class ReplyReader(Protocol):
     """A robot's protocol that reads the robot's replies."""
 

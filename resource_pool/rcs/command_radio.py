@@ -35,7 +35,7 @@ from backbone.naming import Subsystem, address, component_of
 from backbone.rc_manager.messages import LONGEST_PACKET_S, RcState, StaleEpoch
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import AnsweringRadio, HardwareFault, RadioDriver, open_device
+from resource_pool.drivers.interface import HardwareFault, RadioDriver, open_device
 from resource_pool.holds import Hold
 from resource_pool.link_watch import LinkNews, LinkWatch
 from resource_pool.messages import (
@@ -229,13 +229,13 @@ class CommandRadio(ResourceController[RcParameters]):
 
     def _listen(self, network_id: int, robot: str) -> None:
         """Receive this robot's replies, if the radio can."""
-        if isinstance(self._driver, AnsweringRadio) and self._links.add(network_id, robot):
+        if hasattr(self._driver, "hear") and self._links.add(network_id, robot):
             self._heard_robots.add(network_id)
             self._driver.hear(network_id, functools.partial(self._heard, network_id))
 
     async def driver_exchanged(self) -> None:
         """Receive replies of the same robots with the new driver."""
-        if isinstance(self._driver, AnsweringRadio):
+        if hasattr(self._driver, "hear"):
             for network_id in sorted(self._heard_robots):
                 self._driver.hear(network_id, functools.partial(self._heard, network_id))
 

@@ -29,7 +29,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.ranges import MOST_PX
 from resource_pool.commands import Command, Tune
-from resource_pool.drivers.interface import FramegrabberDriver, HardwareFault, Picture, YieldingDriver, open_device
+from resource_pool.drivers.interface import FramegrabberDriver, HardwareFault, Picture, open_device
 from resource_pool.holds import Hold
 from resource_pool.messages import Accepted, Frame, NothingHeard
 from resource_pool.resource_controller import RcParameters, ResourceController
@@ -167,7 +167,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         return {
             **super().statistics(),
             "pictures_asked_hz": asked_hz,
-            "pictures_allowed_hz": driver.allowed_hz() if isinstance(driver, YieldingDriver) else asked_hz,
+            "pictures_allowed_hz": driver.allowed_hz() if hasattr(driver, "allowed_hz") else asked_hz,
             "frames_delivered": self._delivered,
             "frames_garbled": self._garbled,
             "frames_silent": self._silent,
@@ -249,7 +249,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     def _dark_after_s(self) -> float:
         """Return the mission seconds without a picture after which an ARC counts as blind."""
         driver = self._driver
-        hz = driver.allowed_hz() if isinstance(driver, YieldingDriver) else self.parameters.frame_rate_hz
+        hz = driver.allowed_hz() if hasattr(driver, "allowed_hz") else self.parameters.frame_rate_hz
         return max(DARK_S * self.clock.rate, DARK_PICTURES / hz if hz > 0 else 0.0)
 
     def _is_dark(self, arc: str) -> None:

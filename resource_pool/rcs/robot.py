@@ -12,7 +12,7 @@ import asyncio
 import functools
 import logging
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
@@ -97,11 +97,12 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._timeouts = 0
         self._stop_file = StopFile(launch.run_directory, self.name)
         self._latch = StopLatch(self.name, self._stop_file.read())
+        reader = cast("ReplyReader", self._protocol)
         self._reports = RobotReports(
             self.name,
             bus,
             clock,
-            self._protocol if isinstance(self._protocol, ReplyReader) and self.reports is not None else None,
+            reader if hasattr(reader, "read") and self.reports is not None else None,
             alarm_share=self.parameters.battery_alarm_share,
             say=functools.partial(self.publish_event, self.name),
         )

@@ -91,6 +91,28 @@ class SilentProtocol:
         return getattr(self._protocol, word)
 
 
+class PassesOn:
+    """Has no methods of its own: it passes all calls on, as a wrapper that counts them does."""
+
+    def __init__(self, works: object) -> None:
+        self._works = works
+
+    def __getattr__(self, word: str) -> Any:
+        return getattr(self._works, word)
+
+
+class WrappedRadio(PassesOn):
+    options_type = WiretappedRadio.options_type
+
+    def __init__(self, site: DriverSite) -> None:
+        super().__init__(WiretappedRadio(site))
+
+
+class WrappedProtocol(PassesOn):
+    def __init__(self, site: DriverSite) -> None:
+        super().__init__(SimulatedScoutProtocol(site))
+
+
 class ReportsNothing(Scout):
     """A kind of robot without gauges."""
 
@@ -340,6 +362,22 @@ def test_radio_or_protocol_without_replies_work_as_before(local_mission: Any, rc
             found = counts(pool, "radio")
             assert (found["replies"], found["replies_lost"]) == (0, 0)
             assert not said(events)
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(
+    ("rc", "changed"),
+    [("radio", {"driver": f"{HERE}:WrappedRadio"}), ("scout1", {"protocol": f"{HERE}:WrappedProtocol"})],
+)
+def test_replies_come_through_what_passes_calls_on(local_mission: Any, rc: str, changed: dict[str, str]) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, RCS) as pool:
+            await pool.end(rc)
+            await pool.rc(rc, **changed)
+            await drive(pool, 3.0, await granted(pool))
+            assert (await asked(pool)).at_s > 0
+            assert counts(pool, "radio")["replies"] > 0
 
     run_virtual(main())
 
