@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scout_model.robot import FeelingRobot, Robot
+from scout_model.robot import FeelingRobot, Robot, feeling
 
 
 class Senses:
@@ -23,9 +23,9 @@ class Senses:
         self._model, self._data, self._option = model, data, model.opt
         sensors = parts_by_robot(model.sensor(sensor).name for sensor in range(model.nsensor))
         self._bodies = [
-            _BodySenses(model, sensors[name], program)
+            _BodySenses(model, sensors[name], feels)
             for name, program in programs.items()
-            if isinstance(program, FeelingRobot) and name in sensors
+            if (feels := feeling(program)) is not None and name in sensors
         ]
         self._felt = b""
         self.update(0.0)

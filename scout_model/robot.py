@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import re
 from collections.abc import Mapping, Sequence
-from typing import Protocol, runtime_checkable
+from typing import Protocol, cast, runtime_checkable
 
 from scout_model.battery import Battery
 from scout_model.errors import InvalidWorld
@@ -94,6 +94,19 @@ def robot_class(kind: str) -> type[Robot]:
     if not isinstance(found, type) or lacking:
         raise InvalidWorld(f"{kind} is no kind of robot: it lacks {', '.join(lacking) or 'a class'}")
     return found
+
+
+def answering(program: Robot) -> AnsweringRobot | None:
+    """Return the program if it replies, by a method of its own or of another program to which it passes calls on.
+
+    Not ``isinstance``, which from Python 3.12 on sees only the first.
+    """
+    return cast("AnsweringRobot", program) if hasattr(program, "reply") else None
+
+
+def feeling(program: Robot) -> FeelingRobot | None:
+    """Return the program if it receives readings; see ``answering``."""
+    return cast("FeelingRobot", program) if hasattr(program, "feel") else None
 
 
 def fit_battery(program: Robot, battery_j: float, kind: str) -> None:

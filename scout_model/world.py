@@ -24,7 +24,7 @@ from scout_model.description import RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.readings import Senses, parts_by_robot
-from scout_model.robot import AnsweringRobot, Robot, fit_battery, robot_class
+from scout_model.robot import AnsweringRobot, Robot, answering, fit_battery, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
 from scout_model.stability import Stability
 from scout_model.targets import Route, TargetState, part_poses, parts
@@ -327,7 +327,7 @@ class World:
         return _Body(
             kind=kind,
             program=program,
-            answers=program if isinstance(program, AnsweringRobot) else None,
+            answers=answering(program),
             actuators=actuators,
             free=int(free.qposadr[0]),
             positions=slice(int(free.qposadr[0]), last_position),

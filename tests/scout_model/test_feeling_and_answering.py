@@ -4,6 +4,7 @@ import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -67,6 +68,29 @@ class Feeler:
 
     def feel(self, readings: Mapping[str, Sequence[float]], now_s: float) -> None:
         self.felt.append((now_s, {name: list(reading) for name, reading in readings.items()}))
+
+
+class Wrapped:
+    """A Scout whose packets are counted; it passes everything else on."""
+
+    body_mjcf = Scout.body_mjcf
+    frequency, motors = property(lambda self: self.of.frequency), property(lambda self: self.of.motors)
+
+    def __init__(self) -> None:
+        self.of, self.heard = Scout(), 0
+
+    def __getattr__(self, word: str) -> Any:
+        return getattr(self.of, word)
+
+    def hear(self, payload: bytes, now_s: float) -> None:
+        self.heard += 1
+        self.of.hear(payload, now_s)
+
+    def controls(self, now_s: float) -> Mapping[str, float]:
+        return self.of.controls(now_s)
+
+    def counts(self) -> Mapping[str, int]:
+        return {**self.of.counts(), "heard": self.heard}
 
 
 @pytest.fixture(autouse=True)
@@ -145,6 +169,15 @@ def test_only_robots_with_the_methods_feel_and_answer() -> None:
 
 
 # ---------------------------------------------------------------------- the Scout's side
+def test_a_robot_feels_and_answers_through_a_program_that_passes_calls_on() -> None:
+    room = scouts(RobotPlace("wrapped", 2, 8.0, 5.0, 0.0, f"{__name__}:Wrapped"))
+    for network_id in (1, 2):
+        room.hear(network_id, radio_link.encode_drive(9.0, 9.0))
+    for _ in range(30):
+        room.step_frame()
+    assert room.reply(2) == room.reply(1) != b""
+
+
 def test_a_scout_answers_once_what_it_heard_and_not_what_was_noise() -> None:
     room = scouts()
     assert room.reply(1) == b""
