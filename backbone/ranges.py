@@ -177,10 +177,16 @@ def wildness(value: object, depth: int = 0) -> str:
 @functools.cache
 def holds_values_of_any_kind(kind: Any) -> bool:
     """Return whether this type admits values of any kind, which types alone cannot check."""
-    kind = unaliased(kind)
-    if isinstance(kind, type) and issubclass(kind, Struct):
-        return bool(_fields_of_any_kind(kind))
-    return kind is Any or any(map(holds_values_of_any_kind, typing.get_args(kind)))
+    waiting, seen = [kind], set[Any]()  # a struct may contain itself
+    while waiting:
+        one = unaliased(waiting.pop())
+        if one is Any:
+            return True
+        if one not in seen:
+            seen.add(one)
+            is_struct = isinstance(one, type) and issubclass(one, Struct)
+            waiting += typing.get_type_hints(one).values() if is_struct else typing.get_args(one)
+    return False
 
 
 @functools.cache

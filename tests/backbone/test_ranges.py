@@ -101,6 +101,21 @@ def test_what_is_wild_is_named() -> None:
         Reader(SetParameter).read(enveloped(["SetParameter/1", "speed", [1, {"a": math.nan}]]))
 
 
+class Branch(Message, frozen=True):
+    """A message that contains messages of its own kind, and values of any kind."""
+
+    branches: list[Branch]
+    value: Any = None
+
+
+def test_what_is_wild_in_a_message_that_contains_its_own_kind_is_named() -> None:
+    reader = Reader(Branch)
+    tree = Branch([Branch([], 1), Branch([Branch([], [2, "leaf"])])])
+    assert reader.read(enveloped(msgspec.to_builtins(tree))).body == tree
+    with pytest.raises(MalformedMessage, match="a number of nan"):
+        reader.read(enveloped(msgspec.to_builtins(Branch([Branch([Branch([], math.nan)])]))))
+
+
 def unrefused(kind: type[Message]) -> list[str]:
     """Return the names of the hostile messages of this kind that are read."""
     reader: Reader[Any] = Reader(kind)
