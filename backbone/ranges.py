@@ -177,7 +177,7 @@ def wildness(value: object, depth: int = 0) -> str:
 @functools.cache
 def holds_values_of_any_kind(kind: Any) -> bool:
     """Return whether this type admits values of any kind, which types alone cannot check."""
-    waiting, seen = [kind], set[Any]()  # a struct may contain itself
+    waiting, seen = [kind], set[object]()  # a struct may contain itself
     while waiting:
         one = unaliased(waiting.pop())
         if one is Any:
