@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import os
-import select
+import selectors
 import threading
 import time
 from collections import deque
@@ -86,7 +86,9 @@ class TerminalOutput:
             try:
                 text = text[os.write(self._descriptor, text) :]
             except BlockingIOError:  # whoever had the terminal before left it so
-                select.select([], [self._descriptor], [])
+                with selectors.SelectSelector() as waiting:
+                    waiting.register(self._descriptor, selectors.EVENT_WRITE)
+                    waiting.select()
             except OSError:
                 return False
         return True
