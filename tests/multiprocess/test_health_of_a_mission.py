@@ -134,18 +134,18 @@ def test_a_stranger_on_the_bus_writes_no_escape_to_any_terminal(mission: Running
         async with mission.bus() as bus:
             for at in ("ui_console/tester", "resource_pool/scout1"):
                 bus.publish(at, Conversation.LOG, StoryEvent(1.0, at, hostile, hostile, hostile))
-            scout = next(c for c in mission.status()["components"] if c["name"] == "scout2")
+            scout = next(c for c in mission.status()["components"] if c["name"] == "scout3")  # no ARC holds it
             state = ComponentState(
-                "resource_pool/scout2", "scout", scout["host"], scout["pid"], LifeState.READY, 1.0, hostile
+                "resource_pool/scout3", "scout", scout["host"], scout["pid"], LifeState.READY, 1.0, hostile
             )
-            bus.publish("resource_pool/scout2", Conversation.STATUS, state)
+            bus.publish("resource_pool/scout3", Conversation.STATUS, state)
             await asyncio.sleep(0.5)
 
     asyncio.run(main())
     mission.wait_for_line("all is well", 10.0)
     shown = [
         mission.command("scout-backbone", *words, "--mission", mission.name)
-        for words in (["status"], ["status", "--json"], ["why", "scout2"], ["story", "scout2"])
+        for words in (["status"], ["status", "--json"], ["why", "scout3"], ["story", "scout3"])
     ]
     assert "all is well [/red]" in shown[0].stdout
     assert all(done.returncode == 0 for done in shown)
