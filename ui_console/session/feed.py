@@ -88,7 +88,7 @@ class ConsoleFeed:
         self.listed = asyncio.Event()
         """Set when every component has answered the first questions or timed out."""
         self._is_up = True
-        self.unanswered = UnansweredStops(clock, self._stop_again)
+        self.unanswered = UnansweredStops(bus, clock, self._hear, self._showing_failure)
         """Stops that no robot answered, to be run by its owner."""
 
     # ------------------------------------------------------------------ listening
@@ -211,18 +211,6 @@ class ConsoleFeed:
             self._hear(stop)
             return stop.is_stopped and stop.is_confirmed  # it may be lifted already, or its radio was silent
         return False
-
-    async def _stop_again(self, robot: str, reason: str, user: str) -> bool:
-        """Repeat a stop once; return whether it was answered."""
-        try:
-            stop = await stop_robot(self._bus, robot, reason, user)
-        except LinkError:
-            return False
-        except Refusal as refusal:
-            self._show(failed(self._clock.now_s(), refusal))
-            return True
-        self._hear(stop)
-        return True
 
     async def _resolve(self, name: str) -> str:
         resolved = await self._bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 
-from backbone.bus.interface import Clock
+from backbone.bus.interface import Bus, Clock
+from backbone.errors import LinkError
+from resource_pool.arc_client import StopState, stop_robot
 
 AGAIN_EACH_S = 0.5  # chosen: once a link is back, its robot stops as soon as a person sees the robot again
 
@@ -13,15 +16,24 @@ AGAIN_EACH_S = 0.5  # chosen: once a link is back, its robot stops as soon as a 
 class UnansweredStops:
     """The emergency stops of one console that no robot answered.
 
-    Law: each is sent again until it is answered or ``run`` is cancelled; never in vain, because a stop moves nothing.
+    Law: each is sent again until the robot's RC answers it or ``run`` is cancelled. A late stop is safe, because a stop
+    moves nothing.
 
     Args:
+        bus: Bus of the console.
         clock: The mission's clock.
-        send: Sends a stop with robot, reason and user; returns whether the robot's RC answered.
+        heard: Called with each answer.
+        showing_refusal: Makes a block that shows a refusal instead of raising it.
     """
 
-    def __init__(self, clock: Clock, send: Callable[[str, str, str], Awaitable[bool]]) -> None:
-        self._clock, self._send = clock, send
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        heard: Callable[[StopState], None],
+        showing_refusal: Callable[[], AbstractContextManager[object]],
+    ) -> None:
+        self._bus, self._clock, self._heard, self._showing_refusal = bus, clock, heard, showing_refusal
         self._stops: dict[str, tuple[str, str]] = {}
         self._news = asyncio.Event()
 
@@ -39,10 +51,15 @@ class UnansweredStops:
         while True:
             await self._news.wait()
             await self._clock.sleep_s(AGAIN_EACH_S * self._clock.rate)
-            await asyncio.gather(*(self._again(robot) for robot in self._stops))
+            await asyncio.gather(*(self._again(robot, *stop) for robot, stop in self._stops.items()))
             if not self._stops:
                 self._news.clear()
 
-    async def _again(self, robot: str) -> None:
-        if await self._send(robot, *self._stops[robot]):
-            self.answered(robot)
+    async def _again(self, robot: str, reason: str, user: str) -> None:
+        with self._showing_refusal():
+            try:
+                stop = await stop_robot(self._bus, robot, reason, user)
+            except LinkError:
+                return
+            self._heard(stop)
+        self.answered(robot)
