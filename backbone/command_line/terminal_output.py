@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-BEHIND_S = 0.5  # chosen: older pictures help nobody, and a terminal that reads takes them at once
+BEHIND_S = 0.5  # chosen: an operator has no use for an older picture; a terminal that is read takes each at once
 MOST_WAITING_BYTES = 1 << 20  # chosen: the lines of a day in which much happens
 
 
@@ -85,7 +85,7 @@ class TerminalOutput:
         while text:
             try:
                 text = text[os.write(self._descriptor, text) :]
-            except BlockingIOError:  # whoever had the terminal before left it so
+            except BlockingIOError:  # an earlier program set the terminal to non-blocking
                 with selectors.SelectSelector() as waiting:
                     waiting.register(self._descriptor, selectors.EVENT_WRITE)
                     waiting.select()

@@ -20,7 +20,7 @@ _WARNINGS, _TASKS, _THREADS = "py.warnings", "asyncio", "threads"
 
 
 class StrayFaults(logging.Handler):
-    """Tells each new fault in the event loop.
+    """Log handler that calls ``tell`` in the event loop, once for each new fault.
 
     Args:
         tell: Called in the loop with the fault as one line, and with the name of the task in which it occurred.
@@ -47,7 +47,7 @@ def strays_told(tell: Callable[[str, str], None]) -> Iterator[None]:
     levels = [one.level for one in loggers]
     for one in loggers:
         one.addHandler(told)
-        one.setLevel(logging.WARNING)  # the story has them whatever the log leaves out
+        one.setLevel(logging.WARNING)  # else the log's own level would keep warnings from the story
     logging.captureWarnings(True)
     threading.excepthook = _thread_failed
     try:

@@ -114,7 +114,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
         shares_process: Whether the placer may put its components into a process with others.
         alike_most: Largest number of its components in one process; 1: they do not share one.
         roles: Role → kind of RC in the set of an ARC; empty: it is no ARC.
-        locates: Whether it tells where robots are.
+        locates: Whether it answers ``AskPose``, as localizers do.
     """
 
     doc: str = ""

@@ -89,7 +89,7 @@ def _without_schema(found: type[AnyComponent]) -> str:
                 msgspec.json.schema(field.type)
             except TypeError as error:
                 return f"parameter {field.name}: {_told(error)}"
-    except Exception:  # the class itself has the fault, which the caller tells
+    except Exception:  # the fault is in the class as a whole; the caller reports it
         return ""
     return ""
 

@@ -1,7 +1,7 @@
 """Recovering: a whole recording of what is readable of one that is damaged, or whose recorder was killed.
 
 Rules of this file: a damaged chunk costs its own messages alone, and is counted. Of a file that is cut, or damaged
-between two chunks, all before that place is kept, and the length of the rest is told.
+between two chunks, the messages before that place are kept, and the command prints the length of the rest.
 """
 
 from __future__ import annotations
