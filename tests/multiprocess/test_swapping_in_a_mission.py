@@ -113,14 +113,19 @@ class Talk:
         return await self.bus.ask(UNIT, asked, Swapped, within_s=WITHIN_S)
 
     def lost(self) -> int:
-        """Return how many numbers have no answer; none may have two, and the sum of the rest must be known."""
+        """Return how many numbers have no answer; none may have two, and the sum of the rest must be known.
+
+        A number without an answer is in the sum if its answer was lost on the way back: outputs are best effort.
+        """
         numbers = [one.number for one in self.answered]
         assert len(numbers) == len(set(numbers)), "no answer is doubled"
         assert numbers == sorted(numbers)
-        totals = [one.total for one in self.answered]
-        steps = [after - before for before, after in itertools.pairwise(totals)]
-        assert steps == numbers[1:], "the state is kept: each total is the one before and the number"
-        return numbers[-1] - numbers[0] + 1 - len(numbers)
+        for before, after in itertools.pairwise(self.answered):
+            possible = {after.number}
+            for lost in range(before.number + 1, after.number):
+                possible |= {one + lost for one in possible}
+            assert after.total - before.total in possible, f"the state is kept: from {before} to {after}"
+        return int(numbers[-1] - numbers[0] + 1 - len(numbers))
 
     async def overwritten(self) -> int:
         """Return how many numbers newer ones replaced, in the unit or on the bus, before the unit took them."""
