@@ -21,7 +21,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import io
 import os
 import subprocess
 import sys
@@ -104,36 +103,26 @@ class Driver:
         self.shown += int(part.result())
 
 
-class Counter(io.TextIOBase):
-    """Counts printed lines; a terminal would cost more."""
-
-    def __init__(self) -> None:
-        self.lines = 0
-
-    def write(self, text: str) -> int:
-        """Count the lines."""
-        self.lines += text.count("\n")
-        return len(text)
-
-
 def be_watcher(cycles: int, seconds: float) -> None:
     """Run a part for each line of the input, which names its kind; print how many messages were shown."""
     go_behind_others()  # as the command does
     message_classes()  # read once, not at each attaching
     lasted_s = used_s = 0.0
     for line in sys.stdin:
-        began_s, used_before_s, counter = time.monotonic(), time.process_time(), Counter()
+        began_s, used_before_s, shown = time.monotonic(), time.process_time(), 0
         if line.strip() == "watched":
-            with contextlib.redirect_stdout(counter):
+            with tempfile.TemporaryFile("w+") as lines, contextlib.redirect_stdout(lines):  # a terminal costs more
                 for _ in range(cycles):
                     uvloop.run(watch(WHERE, Watched((), for_s=seconds)))
+                lines.seek(0)
+                shown = sum(1 for _ in lines)
             lasted_s, used_s = time.monotonic() - began_s, time.process_time() - used_before_s
         else:
             for cycle in range(1, cycles + 1):
                 while line.strip() == "busy" and time.process_time() - used_before_s < used_s * cycle / cycles:
                     pass
                 time.sleep(max(0.0, began_s + lasted_s * cycle / cycles - time.monotonic()))
-        print(counter.lines, flush=True)
+        print(shown, flush=True)
 
 
 async def measure(given: argparse.Namespace) -> Driver:
@@ -180,9 +169,11 @@ def main() -> None:
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
             assert launcher.stderr is not None
             next(line for line in launcher.stderr if line.startswith("all ready"))
-            driver = uvloop.run(measure(given))
-            launcher.terminate()
-            launcher.stderr.read()
+            try:
+                driver = uvloop.run(measure(given))
+            finally:
+                launcher.terminate()
+                launcher.stderr.read()
     kinds = [(kind, driver.times[kind]) for kind in KINDS]
     half, late = ({kind: percentile(times.applied_s, share) for kind, times in kinds} for share in (0.5, 0.99))
     of_parts = {kind: median(times.late_s) for kind, times in kinds}
