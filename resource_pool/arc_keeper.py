@@ -106,7 +106,8 @@ class ArcKeeper:
         while True:
             try:
                 order = Start(kind, self._arc, parameters)
-                await ask_to_start(self._bus, self._clock, self._wish, order, START_TIME_S, self._on_changed)
+                at = self._client.address
+                await ask_to_start(self._bus, self._clock, self._wish, order, at, START_TIME_S, self._on_changed)
                 return
             except NameTaken as refusal:
                 cause = f"one from before has its name: {refusal.detail}"

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import Absence, NameTaken
+from backbone.component.messages import Absence, AskState, ComponentState, LifeState, NameTaken
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.creator.messages import START_MOST_S
 from backbone.errors import LinkError, Refusal
@@ -31,6 +31,7 @@ COMPARE_EVERY_S = 20.0  # chosen: every known cause triggers a comparison at onc
 REPLY_TIME_S = 1.0  # chosen: the placer answers in milliseconds
 START_WITHIN_S = START_MOST_S + 10.0  # chosen: the placer's own limit and a moment
 SLOW_START_S = 1.5  # chosen: most starts take less than one; health names an absent component within 2 s
+ASK_ITSELF_S = 0.5  # chosen: a component answers in milliseconds; with the token's second, health is right within 2 s
 
 
 @dataclass
@@ -53,6 +54,10 @@ class Wish:
         """Record that the placer has the component."""
         self.missing_since_s, self.cause, self.started, self._pause_s = -1.0, "", True, PAUSE_FIRST_S
 
+    def ready(self) -> None:
+        """Record that the component itself says that it is ready, whatever the placer and the hub know."""
+        self.missing_since_s, self.cause = -1.0, ""
+
     def missing(self, cause: str, now_s: float) -> None:
         """Record that the placer does not have the component."""
         self.cause = cause
@@ -73,9 +78,9 @@ class Wish:
 
 
 async def ask_to_start(
-    bus: Bus, clock: Clock, wish: Wish, order: Start, within_s: float, on_changed: Callable[[], None]
+    bus: Bus, clock: Clock, wish: Wish, order: Start, address: str, within_s: float, on_changed: Callable[[], None]
 ) -> Started:
-    """Return the placer's answer; after ``SLOW_START_S`` the component counts as absent until the answer comes.
+    """Return the placer's answer; after ``SLOW_START_S`` the component is absent until it is ready or the answer comes.
 
     Raises:
         Refusal: The placer did not start it.
@@ -83,15 +88,31 @@ async def ask_to_start(
     """
 
     async def report_slow_start() -> None:
-        await clock.sleep_s(SLOW_START_S * clock.rate)
-        wish.missing("its start is not confirmed yet", clock.now_s())
-        on_changed()
+        while True:
+            await clock.sleep_s(SLOW_START_S * clock.rate)
+            if await says_ready(bus, address):
+                wish.ready()
+            else:
+                wish.missing("its start is not confirmed yet", clock.now_s())
+            on_changed()
 
     slow = asyncio.create_task(report_slow_start(), name=f"{wish.name}: slow start")
     try:
         return await bus.ask(PLACER, order, Started, within_s=within_s)
     finally:
         slow.cancel()
+
+
+async def says_ready(bus: Bus, address: str) -> bool:
+    """Return whether the component itself answers that it is ready.
+
+    After a restart of the hub, its token or the placer's answer may be missing although the component works.
+    """
+    try:
+        state = await bus.ask(address, AskState(), ComponentState, within_s=ASK_ITSELF_S)
+    except (LinkError, Refusal):
+        return False
+    return state.state is LifeState.READY
 
 
 async def keep_placed(
@@ -122,7 +143,7 @@ async def keep_placed(
     try:
         while True:
             try:
-                placement, was_there = await _start(bus, clock, wish, order, on_changed, give_up_s)
+                placement, was_there = await _start(bus, clock, wish, order, address, on_changed, give_up_s)
             except StoppedMeanwhile as stopped:
                 return stopped.detail
             wish.placed()
@@ -139,13 +160,19 @@ async def keep_placed(
 
 
 async def _start(
-    bus: Bus, clock: Clock, wish: Wish, ordered: Callable[[], Start], on_changed: Callable[[], None], give_up_s: float
+    bus: Bus,
+    clock: Clock,
+    wish: Wish,
+    ordered: Callable[[], Start],
+    address: str,
+    on_changed: Callable[[], None],
+    give_up_s: float,
 ) -> tuple[Placement, bool]:
     """Return the placement, and whether the component ran already."""
     while True:
         order = ordered()
         try:
-            started = await ask_to_start(bus, clock, wish, order, START_WITHIN_S, on_changed)
+            started = await ask_to_start(bus, clock, wish, order, address, START_WITHIN_S, on_changed)
         except NameTaken:
             try:
                 return await bus.ask(PLACER, AskPlacement(wish.name), Placement, within_s=REPLY_TIME_S), True
@@ -175,22 +202,28 @@ async def _start(
 async def _wait_missing(
     bus: Bus, clock: Clock, wish: Wish, component: PeerMonitor, placer: PeerMonitor, on_changed: Callable[[], None]
 ) -> NotPlaced:
-    """Return the placer's answer that it lacks the component; meanwhile an unreachable component is absent."""
+    """Return the placer's answer that it lacks the component.
+
+    Meanwhile a component is absent whose token is missing and that does not answer.
+    """
     compared_with = placer.times_risen
     while True:
         if component.is_there and wish.absence() is not None:
-            wish.placed()
+            wish.ready()
             on_changed()
+        away = [] if component.is_there else [component.wait_there()]
         await first_of(
             component.wait_gone(),
-            *([] if component.is_there else [component.wait_there()]),
+            *away,
             placer.wait_risen(max(compared_with, 1) + 1),
             clock.sleep_s(COMPARE_EVERY_S * clock.rate),
         )
         if not component.is_there:
-            wish.missing("it cannot be reached: it is being restarted, or its link is cut", clock.now_s())
+            if await says_ready(bus, component.address):
+                wish.ready()
+            else:
+                wish.missing("it cannot be reached: it is being restarted, or its link is cut", clock.now_s())
             on_changed()
-        await placer.wait_there()
         compared_with = placer.times_risen
         try:
             await bus.ask(PLACER, AskPlacement(wish.name), Placement, within_s=REPLY_TIME_S)
@@ -198,7 +231,9 @@ async def _wait_missing(
             return refusal
         except (LinkError, Refusal) as error:
             log.info("the placer does not answer about %s: %s", wish.name, error)
-            await clock.sleep_s(PAUSE_FIRST_S * clock.rate)
+            away = [peer.wait_there() for peer in (component, placer) if not peer.is_there]
+            pause_s = PAUSE_FIRST_S if placer.is_there else PAUSE_MOST_S
+            await first_of(*away, clock.sleep_s(pause_s * clock.rate))
             continue
         if not component.is_there:  # its creator or the placer restarts it: compare again after a pause
             await first_of(component.wait_there(), clock.sleep_s(PAUSE_MOST_S * clock.rate))
