@@ -23,7 +23,7 @@ from backbone.mission.tables import (
     section,
 )
 from backbone.naming import is_legal
-from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.rules import SchedulingRules, rule_fault
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")  # the schema refuses other names
 SERVICE_PARAMETERS = {"rc_manager": parameters_of(SchedulingRules)}
@@ -38,7 +38,11 @@ def check_service_parameters(service: Element, tables: Tables, report: Report) -
     check_unique(service.all("parameter"), "name", "parameter", report)
     known = SERVICE_PARAMETERS.get(kind, ())
     _check_given(service, kind, known, (), report, "Remove it; only the rc_manager's rules can be set")
+    rules = {one.name: one for one in known}
     for parameter in service.all("parameter"):
+        one, value = rules.get(parameter.text("name")), parameter_value(parameter.text("value"))
+        if one is not None and one.accepts(value) and (fault := rule_fault(one.name, value)):
+            report.fault(parameter.place_of("value"), fault, f"{one.name}: {one.meaning}")
         if parameter.text("name") == PLANNER and CLASS_PATH.fullmatch(parameter.text("value")):
             facts = tables.classes.get(tables.planned(service))
             if check_class_path(parameter, "value", report) and facts is not None and facts.failure:

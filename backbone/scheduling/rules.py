@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, get_args
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, ValidationError, convert
 
 from backbone.scheduling.fairness import Discipline
 from backbone.scheduling.response_time import Analysis
@@ -16,6 +16,9 @@ from backbone.scheduling.response_time import Analysis
 Policy = Literal["no_delay", "strict"]
 
 ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
+SHORTEST_AGING_S = (
+    1.0  # chosen: longer than common RCs settle; ARCs that rise sooner override each other before a grant
+)
 LONGEST_S = 86_400.0  # chosen: a day, as for all other times of a mission file
 
 
@@ -23,7 +26,7 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Rules of the RC manager; ``check`` prints their descriptions.
 
     Raises:
-        ValueError: A rule is not known, or a time is below 0.
+        ValueError: A rule is not known, or a time is below its least.
     """
 
     policy: Annotated[
@@ -45,7 +48,7 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         Meta(
             ge=0,
             le=LONGEST_S,
-            description="a waiting ARC rises one level each time this many seconds have passed; 0: never",
+            description="a waiting ARC rises one level each time this many seconds have passed, at least 1; 0: never",
         ),
     ] = 0.0
     grid_s: Annotated[
@@ -81,6 +84,8 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         for rule in ("aging_s", "grid_s", "grace_s"):
             if not 0 <= getattr(self, rule) < math.inf:
                 raise ValueError(f"{rule} is {getattr(self, rule)}; it must be at least 0")
+        if 0 < self.aging_s < SHORTEST_AGING_S:
+            raise ValueError(f"aging_s is {self.aging_s}; it must be 0 (never) or at least {SHORTEST_AGING_S:g}")
 
 
 def values_of(rule: str) -> tuple[str, ...]:
@@ -93,3 +98,17 @@ def values_of(rule: str) -> tuple[str, ...]:
     return {"policy": get_args(Policy), "discipline": get_args(Discipline), "admission": get_args(Analysis)}.get(
         rule, ()
     )
+
+
+def rule_fault(rule: str, value: object) -> str:
+    """Return why the rules cannot have this value; empty: they can.
+
+    Example:
+        >>> rule_fault("aging_s", 0.5), rule_fault("aging_s", 10)
+        ('aging_s is 0.5; it must be 0 (never) or at least 1', '')
+    """
+    try:
+        convert({rule: value}, SchedulingRules)
+    except ValidationError as error:
+        return str(error)
+    return ""

@@ -100,3 +100,13 @@ def test_what_is_no_planner_here_is_a_fault_with_its_place(tmp_path: Path, plann
     (fault,) = invalid.value.faults
     assert message in str(fault)
     assert fault.line == 12
+
+
+def test_aging_before_a_hand_over_can_end_is_refused(tmp_path: Path) -> None:
+    """ARCs that rise every millisecond override each other before a grant, and none gets a turn."""
+    with pytest.raises(MissionInvalid) as invalid:
+        with_rules(tmp_path, aging_s="0.001")
+    (fault,) = invalid.value.faults
+    assert "aging_s is 0.001; it must be 0 (never) or at least 1" in str(fault)
+    assert fault.line == 12
+    assert with_rules(tmp_path, aging_s="1").core_parameters("rc_manager") == {"aging_s": 1}
