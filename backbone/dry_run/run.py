@@ -11,6 +11,7 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -18,6 +19,7 @@ import msgspec
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.inventory import Inventory
 from backbone.dependency_database.messages import FindRcs
+from backbone.dry_run.hang_watch import Hangs, Progress, result_unless_it_hangs
 from backbone.errors import BackboneError, Refusal, code_of, complaint
 from backbone.mission.behavior_orders import PathStep
 from backbone.mission.model import ArcWish, BehaviorDescription, MissionDescription
@@ -27,7 +29,7 @@ from backbone.placer.placement import CandidateHost, place
 from backbone.rc_manager.recovery import rc_known
 from backbone.rc_manager.service import TOLERANCE_S
 from backbone.scheduling.claims import scheduling_request
-from backbone.scheduling.events import Requested
+from backbone.scheduling.events import Event, Instruction, Requested
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import MEND, WrongPlanner, load_planner
 from backbone.scheduling.rehearsal import Rehearsal, Timetable
@@ -38,6 +40,7 @@ from backbone.scheduling.trace import Line
 from backbone.scheduling.views import Why
 
 FIRST_MINUTE_S = 60.0
+DECIDES_WITHIN_S = 10.0  # chosen: a decision takes milliseconds, that of a large group a second on a loaded machine
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,20 +135,41 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
         for_s: Mission seconds, at least 0; the last branch is tried for at most its own time.
 
     Raises:
-        WrongPlanner: The mission's own planner cannot be loaded, or failed at work.
+        WrongPlanner: The mission's own planner cannot be loaded, fails at work, or hangs.
     """
-    rules = msgspec.convert(description.core_parameters("rc_manager"), SchedulingRules)
+    rules, progress = _rules(description), Progress()
+    work = partial(_dry_run, description, for_s, progress)
+    if not rules.planner:
+        return work()
     try:
-        return _dry_run(description, rules, for_s)
+        return result_unless_it_hangs(work, progress, DECIDES_WITHIN_S)
+    except Hangs as hangs:
+        raise WrongPlanner(f"{rules.planner}: {hangs}", remedy=MEND) from hangs
     except BackboneError:
         raise
     except Exception as error:
-        if not rules.planner:
-            raise
         raise WrongPlanner(f"{rules.planner}: {complaint(error)}", remedy=MEND) from error
 
 
-def _dry_run(description: MissionDescription, rules: SchedulingRules, for_s: float) -> DryRun:
+def _rules(description: MissionDescription) -> SchedulingRules:
+    return msgspec.convert(description.core_parameters("rc_manager"), SchedulingRules)
+
+
+@dataclass(frozen=True, slots=True)
+class _Counted:
+    """A schedule manager whose decisions are counted."""
+
+    manager: ScheduleManager
+    progress: Progress
+
+    def handle(self, event: Event, now_s: float) -> list[Instruction]:
+        """Count and decide."""
+        self.progress.steps += 1
+        return self.manager.handle(event, now_s)
+
+
+def _dry_run(description: MissionDescription, for_s: float, progress: Progress) -> DryRun:
+    rules = _rules(description)
     placed = placements(description)
     hosts = {one.name: one.host for one in placed}
     manager = ScheduleManager(
@@ -155,19 +179,22 @@ def _dry_run(description: MissionDescription, rules: SchedulingRules, for_s: flo
         mission_priority=description.priority,
         planner=load_planner(rules.planner),
     )
-    rehearsal = Rehearsal(manager, opening_lines=manager.opening_lines())
+    rehearsal = Rehearsal(_Counted(manager, progress), opening_lines=manager.opening_lines())
     for resource in description.resources:
         rehearsal.tell(msgspec.structs.replace(rc_known(resource, None), up=bool(hosts[resource.name])))
     answers = Answers(manager)
     asked = [(claim, *_ask(manager, rehearsal, claim, hosts)) for claim in _claims(description)]
     rehearsal.run(for_s)
     timetable = Timetable(rehearsal.trace, rehearsal.now_s)
-    claimed = [_claimed(answers, timetable, *one) for one in asked]
+    claimed = []
+    for one in asked:
+        progress.steps += 1
+        claimed.append(_claimed(answers, timetable, *one))
     found = DryRun(description.name, placed, claimed, timetable, rehearsal.trace)
     at_the_end, last = description.at_the_end, description.last
     if at_the_end is None or last is None:
         return found
-    return replace(found, last=dry_run(at_the_end, min(for_s, last.within_s)), last_name=last.behavior.name)
+    return replace(found, last=_dry_run(at_the_end, min(for_s, last.within_s), progress), last_name=last.behavior.name)
 
 
 # ---------------------------------------------------------------------- placement

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
+import threading
 from pathlib import Path
 
 import pytest
 
 from backbone.command_line.rehearsing import print_dry_run
+from backbone.dry_run import run
 from backbone.launcher.endings import ExitCode
 from backbone.mission.reader import MissionInvalid, read_mission
 
@@ -58,3 +61,16 @@ def test_a_planner_that_finds_its_own_fault_is_refused_by_the_dry_run(
     mission = read_mission(file_of(tmp_path, monkeypatch, "planner_that_asserts", method))
     assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
     assert "planner_that_asserts:Own: AssertionError: my own check" in capsys.readouterr().err
+
+
+def test_a_planner_that_hangs_is_refused_by_the_dry_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ends = threading.Event()
+    method = "ends = None\n    def order(self, arcs):\n        while not self.ends.wait(0.01): pass"
+    mission = read_mission(file_of(tmp_path, monkeypatch, "planner_that_hangs", method))
+    monkeypatch.setattr(importlib.import_module("planner_that_hangs").Own, "ends", ends)
+    monkeypatch.setattr(run, "DECIDES_WITHIN_S", 0.5)
+    assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
+    ends.set()
+    assert "planner_that_hangs:Own: it does not return within 0.5 s; it is at " in capsys.readouterr().err
