@@ -11,12 +11,14 @@ from typing import NamedTuple
 
 import msgspec
 
+from backbone.errors import complaint
 from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.events import Freed, Opened
 from backbone.scheduling.explain.attributes import attributes
 from backbone.scheduling.explain.explanation import Explanation
 from backbone.scheduling.explain.packet_lines import never_served, packet_lines
 from backbone.scheduling.explain.start_prediction import Foreseen
+from backbone.scheduling.own_planner import WrongPlanner
 from backbone.scheduling.rehearsal import Rehearsal
 from backbone.scheduling.requests import RequestState, Scheduled, UnknownRequest
 from backbone.scheduling.schedule_manager import ScheduleManager
@@ -25,6 +27,11 @@ from backbone.scheduling.views import Attributes, Schedule, Why
 FORESEEN_S = 300.0  # chosen: a start later than in five minutes is no answer to an operator
 FORESEEN_LINES = 1000  # chosen: some two hundred slices
 FORESEEN_WORK = 250_000  # measured: lines × ARCs², of which 32 ARCs take 0.1 s, or 0.25 s under discipline ``time``
+
+COPIES = (
+    "Starts are predicted with a copy of the planner: keep locks, threads and open files out of its attributes, "
+    "or write a __deepcopy__."
+)
 
 
 class Unservable(NamedTuple):
@@ -49,8 +56,12 @@ class Answers:
 
         Args:
             manager: The schedule manager; nothing in it changes.
+
+        Raises:
+            WrongPlanner: The mission's own planner cannot be copied.
         """
         self._manager = manager
+        self._copied()
         self._state = manager.master_schedule.state
         self._explanation = Explanation(manager.master_schedule, manager.rules, self._foresee)
 
@@ -127,10 +138,19 @@ class Answers:
                 pause_s = grace_s / 2 if arc.swapped_out == "slice" and not arc.request.stops_at_once else 0.0
                 under_way.append((max(now_s, arc.since_s + pause_s + arc.release_s), Freed(arc.name)))
         return Rehearsal.going_on(
-            copy.deepcopy(self._manager),
+            self._copied(),
             now_s,
             under_way=sorted(under_way, key=lambda item: item[0]),
             release_s={rc.name: rc.disconnect_s for rc in self._state.rcs.values()},
             wake_s=self._manager.wake_s,
             pause_s=lambda deadline_s: deadline_s / 2,
         )
+
+    def _copied(self) -> ScheduleManager:
+        try:
+            return copy.deepcopy(self._manager)
+        except Exception as error:  # an own planner may have attributes of any kind
+            if not self._manager.rules.planner:
+                raise
+            told = f"{self._manager.rules.planner} cannot be copied: {complaint(error)}"
+            raise WrongPlanner(told, remedy=COPIES) from error

@@ -74,3 +74,17 @@ def test_a_planner_that_hangs_is_refused_by_the_dry_run(
     assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
     ends.set()
     assert "planner_that_hangs:Own: it does not return within 0.5 s; it is at " in capsys.readouterr().err
+
+
+LOCKED = "def __init__(self, table, *, slack_s):\n        super().__init__(table, slack_s=slack_s); "
+
+
+def test_a_planner_that_cannot_be_copied_is_refused_by_the_dry_run_with_how_to_write_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    method = f"{LOCKED}import threading; self.lock = threading.Lock()"
+    mission = read_mission(file_of(tmp_path, monkeypatch, "planner_with_a_lock", method))
+    assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
+    told = capsys.readouterr().err
+    assert "planner_with_a_lock:Own cannot be copied: TypeError: cannot pickle '_thread.lock' object" in told
+    assert "keep locks, threads and open files out of its attributes, or write a __deepcopy__" in told
