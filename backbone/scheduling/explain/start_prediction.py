@@ -58,7 +58,15 @@ class StartPrediction:
 
         Args:
             slots: Places of all queued ARCs of a group, in order.
+
+        Raises:
+            AssertionError: The planner, one's own perhaps, is wrong: the start of an ARC is no time.
         """
+        for slot in slots:
+            if math.isnan(slot.start_s):
+                raise AssertionError(
+                    f"the planner's start of {slot.arc.name} is {slot.start_s}, not a time or infinite"
+                )
         starts_s: dict[ArcEntry, float] = {}
         for slot in sorted(slots, key=lambda slot: slot.start_s):  # an ARC starts later than those it waits for
             start_s = slot.start_s

@@ -88,3 +88,18 @@ def test_a_planner_that_cannot_be_copied_is_refused_by_the_dry_run_with_how_to_w
     told = capsys.readouterr().err
     assert "planner_with_a_lock:Own cannot be copied: TypeError: cannot pickle '_thread.lock' object" in told
     assert "keep locks, threads and open files out of its attributes, or write a __deepcopy__" in told
+
+
+def test_a_planner_whose_starts_are_no_times_is_refused_by_the_dry_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``status`` and ``why`` showed a start at "nan s"."""
+    method = (
+        "def due(self, now_s): return None\n    "
+        "def slots_around(self, arc, now_s): "
+        "return [one._replace(start_s=float('nan')) for one in super().slots_around(arc, now_s)]"
+    )
+    mission = read_mission(file_of(tmp_path, monkeypatch, "planner_of_no_times", method))
+    assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
+    told = capsys.readouterr().err
+    assert "planner_of_no_times:Own: AssertionError: the planner's start of watch-scout1-capture is nan" in told
