@@ -25,7 +25,7 @@ from backbone.authentication import is_address
 from backbone.command_line.standard_streams import standard_streams
 from backbone.command_line.where import Where
 from backbone.errors import BackboneError
-from backbone.launcher.endings import ExitCode
+from backbone.launcher.endings import ExitCode, complaint_of, say
 from backbone.naming import IllegalName, legal
 
 DISTRIBUTION = "scout-backbone"
@@ -75,6 +75,10 @@ def run_table(table: typer.Typer) -> None:
             table()
         except KeyboardInterrupt:
             sys.exit(ExitCode.INTERRUPTED)
+        except BackboneError as error:
+            message, code = complaint_of(error)
+            say(message)
+            sys.exit(code)
 
 
 def _words_before_the_cursor() -> list[str]:

@@ -8,9 +8,13 @@ import os
 import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from functools import partial
-from multiprocessing.synchronize import Event
+from multiprocessing.connection import Connection
 from typing import TypeVar
+
+from backbone.errors import BackboneError
 
 Order = TypeVar("Order")
 Result = TypeVar("Result")
@@ -18,6 +22,11 @@ Result = TypeVar("Result")
 BATCH = 5  # chosen: seconds of work: the last process does not run alone for long, and cached pictures are reused
 
 OBJECTS_AT_ONCE = 20_000  # chosen: some megabytes of garbage; Python's own 700 are for programs that have less
+
+
+class WorkerKilled(BackboneError):
+    """A process that ran some of the work ended without a result."""
+
 
 Progress = Callable[[int, int], None]
 """Callback with the number of finished trials and of all trials."""
@@ -38,6 +47,7 @@ def run_all(
         jobs: Number of processes; 0: one per core; 1: this process.
 
     Raises:
+        WorkerKilled: A process was killed.
         Exception: The first exception of the work; no further call is started.
     """
     results: list[Result] = []
@@ -58,6 +68,9 @@ def results_of(
         orders: Same.
         jobs: Same.
         chunk: Number of orders that a process gets at a time.
+
+    Raises:
+        WorkerKilled: A process was killed.
     """
     jobs = jobs or os.cpu_count() or 1
     if jobs == 1 or len(orders) <= 1:
@@ -65,35 +78,34 @@ def results_of(
         return
     # Spawned, not forked: a fork of a process with threads of its own may hang.
     context = multiprocessing.get_context("spawn")
-    unwanted = context.Event()
-    with ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(unwanted,)) as pool:
+    # A pipe, because an event waits for ever for the answer of a process that was killed.
+    orders_end, wanted = context.Pipe(duplex=False)
+    with ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(orders_end,)) as pool:
         try:
             yield from pool.map(partial(_worked, work), orders, chunksize=chunk)
-        except BaseException:
-            unwanted.set()  # else a person who interrupts waits for half a minute of work
+        except BaseException as error:
+            wanted.close()  # else a person who interrupts waits for half a minute of work
+            if isinstance(error, BrokenProcessPool):
+                raise WorkerKilled(
+                    "a process that ran some of the work was killed; if memory is short, run less"
+                ) from error
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+            wanted.close()
+            orders_end.close()
 
 
-def _begin(unwanted: Event) -> None:
+def _begin(orders_end: Connection) -> None:
     _keep_to_one_core()
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    threading.Thread(target=_end_if, args=(unwanted,), daemon=True).start()
+    threading.Thread(target=_end_with, args=(orders_end,), daemon=True).start()
 
 
-def _end_if(unwanted: Event) -> None:
-    """End at once when nobody wants the results any more."""
-    unwanted.wait()
+def _end_with(orders_end: Connection) -> None:
+    """End at once when nobody wants the results any more, also because the process that gives the orders has ended."""
+    with suppress(EOFError, OSError):
+        orders_end.recv_bytes()
     os._exit(1)
-
-
-def _end_with_parent() -> None:
-    """End at once when the process that gives the orders has ended, even if it was killed."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _keep_to_one_core() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -12,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from mission_control.laboratory.harness import results_of, run_all
+from mission_control.laboratory.harness import WorkerKilled, results_of, run_all
 
 
 def squared(number: int) -> tuple[int, int]:
@@ -28,6 +29,12 @@ def picky(number: int) -> int:
 def long_after_the_first(number: int) -> int:
     if number:
         time.sleep(60.0)
+    return number
+
+
+def killed_at_seven(number: int) -> int:
+    if number == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
     return number
 
 
@@ -64,6 +71,12 @@ def test_progress_is_told_after_each_result() -> None:
 def test_the_first_failure_is_raised(jobs: int) -> None:
     with pytest.raises(ArithmeticError, match="seven"):
         run_all(picky, range(12), jobs=jobs)
+
+
+@pytest.mark.processes
+def test_a_killed_process_ends_the_work_with_a_fault_of_its_own() -> None:
+    with pytest.raises(WorkerKilled, match="was killed"):
+        run_all(killed_at_seven, range(1000), jobs=2)
 
 
 @pytest.mark.processes
