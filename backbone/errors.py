@@ -19,10 +19,10 @@ from types import FrameType
 from typing import ClassVar
 
 from backbone.printable_text import MOST_CHARACTERS, printable
+from backbone.shipped import PACKAGES
 
-_PACKAGES = frozenset({"backbone", "mission_control", "resource_pool", "scout_model", "ui_console"})
 _LIBRARIES = frozenset({"cv2", "mcap", "msgspec", "mujoco", "numpy", "pydantic", "rich", "textual", "uvloop", "zenoh"})
-_NOT_A_DEVELOPERS = _PACKAGES | _LIBRARIES | sys.stdlib_module_names
+_NOT_A_DEVELOPERS = _LIBRARIES.union(PACKAGES) | sys.stdlib_module_names
 
 Fact = str | int | float | bool
 

@@ -17,9 +17,9 @@ import msgspec
 from msgspec import inspect
 
 from backbone.ranges import DEEPEST, LONGEST_DOCUMENT, MOST_ENTRIES
+from backbone.shipped import PACKAGES
 from backbone.wire import Message, schema_of
 
-PACKAGES = ("backbone", "resource_pool", "mission_control", "ui_console", "scout_model")
 A_MEGABYTE = 1_000_000
 TIED = {
     ("Frame", "pixels"),

@@ -7,9 +7,7 @@ import importlib
 from backbone.component.class_faults import class_faults
 from backbone.component.component import AnyComponent, Component
 from backbone.errors import Refusal
-
-SHIPPED = ("backbone.", "mission_control.", "resource_pool.")
-"""Packages of this project. Tests have judged their classes, because a judgment takes a millisecond of each start."""
+from backbone.shipped import is_shipped
 
 
 class WrongClassPath(Refusal):
@@ -32,6 +30,7 @@ def load_class(class_path: str) -> type[AnyComponent]:
         raise WrongClassPath(f"{class_path}: {error}", class_path=class_path) from error
     if not (isinstance(found, type) and issubclass(found, Component)):
         raise WrongClassPath(f"{class_path} is no Component", class_path=class_path)
-    if not class_path.startswith(SHIPPED) and (faults := "; ".join(class_faults(found))):
+    # Tests have judged the shipped classes, because a judgment takes a millisecond of each start.
+    if not is_shipped(class_path) and (faults := "; ".join(class_faults(found))):
         raise WrongClassPath(f"{class_path}: {faults}", class_path=class_path, remedy="Mend the class.")
     return found

@@ -1,7 +1,8 @@
 """Modules that a creator's zygote imports beforehand: components start sooner, and share the memory of these modules.
 
 A module that only one component uses is imported beforehand, too: an import after the fork writes into many pages that
-the component shares with its zygote, and repeats imports that other components make, too.
+the component shares with its zygote, and repeats imports that other components make, too. Only shipped modules are: a
+restarted component gets the preloaded code, and the files of others are edited while a mission runs.
 
 Pure.
 """
@@ -11,9 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from backbone.component_database.messages import ComponentType
-
-SHIPPED = ("mission_control.", "resource_pool.")
-"""Packages whose files are not edited while a mission runs: a restarted component gets the preloaded code."""
+from backbone.shipped import is_shipped
 
 
 def preloaded_modules(types: Iterable[ComponentType], placed: Iterable[str] = ()) -> list[str]:
@@ -41,6 +40,6 @@ def preloaded_modules(types: Iterable[ComponentType], placed: Iterable[str] = ()
         {
             one.class_path.partition(":")[0]
             for one in types
-            if (one.needs or one.name in expected) and one.class_path.startswith(SHIPPED)
+            if (one.needs or one.name in expected) and is_shipped(one.class_path)
         }
     )

@@ -14,6 +14,7 @@ from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
 from backbone.naming import Subsystem, is_legal
 from backbone.ranges import wildness
+from backbone.shipped import is_shipped
 
 CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "dependency_database", "rc_manager")
 """In their order of start. Source: RAM 2002, "Backbone"."""
@@ -24,8 +25,6 @@ WORLD = "world"  # the parameter that names the world, and the world's own param
 ROOM = "room"  # the parameter with the room, for classes that have it
 FLOOR_PLAN = "floor_plan"  # their parameter for a picture of the floor: in the file its name, later its content
 NETWORK_ID = "network_id"  # the parameter by which the radio distinguishes robots
-
-SHIPPED_BODIES = ("scout_model.", "resource_pool.")  # packages whose bodies tests have judged
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ class Tables:
         kind = self.resources[robot.text("name")].text("type") if robot.text("name") in self.resources else ""
         facts = self.facts_of(kind)
         body = robot.text("class") or ("" if facts is None else facts.abilities.body_class)
-        is_own = CLASS_PATH.fullmatch(body) and not body.startswith(SHIPPED_BODIES)
+        is_own = CLASS_PATH.fullmatch(body) and not is_shipped(body)
         if self.world is None or self.world.text("type") not in self.types or not self.is_only_here or not is_own:
             return ""
         return "" if class_path_fault(body) else f"{self.types[self.world.text('type')].text('class')} {body}"

@@ -9,10 +9,11 @@ import pytest
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.class_faults import class_faults
-from backbone.component.class_path import SHIPPED, WrongClassPath, load_class
+from backbone.component.class_path import WrongClassPath, load_class
 from backbone.component.launch import Launch
 from backbone.mission.class_facts import shipped_classes
 from backbone.mission.class_probe import facts_of
+from backbone.shipped import is_shipped
 from mission_control.behavior import Behavior, BehaviorParameters
 from resource_pool.arc_client import Frame
 
@@ -102,5 +103,5 @@ def test_a_class_that_can_work_has_no_fault(kind: type) -> None:
 @pytest.mark.parametrize("class_path", sorted(shipped_classes()))
 def test_no_shipped_class_has_a_fault(class_path: str) -> None:
     """Their starts do not judge them."""
-    assert class_path.startswith(SHIPPED)
+    assert is_shipped(class_path)
     assert list(class_faults(load_class(class_path))) == []
