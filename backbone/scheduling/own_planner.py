@@ -61,5 +61,5 @@ def load_planner(class_path: str) -> PlannerType | None:
 
 def _has(found: object, name: str) -> bool:
     """Return whether the class defines this, or declares it as an attribute of its objects."""
-    declared = (vars(base).get("__annotations__", {}) for base in getattr(found, "__mro__", ()))
+    declared = (inspect.get_annotations(base) for base in getattr(found, "__mro__", ()))
     return hasattr(found, name) or any(name in one for one in declared)
