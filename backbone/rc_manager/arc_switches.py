@@ -7,14 +7,11 @@ from collections.abc import Callable, Coroutine, Iterable
 from typing import Protocol
 
 from backbone.bus.interface import Clock
-from backbone.component.messages import Absence
 from backbone.rc_manager.context_switch import ContextSwitch
+from backbone.rc_manager.failures import Failures
 from backbone.rc_manager.rc_watch import RcWatch
 from backbone.rc_manager.switch_times import SwitchTimes
 from backbone.scheduling.events import ConnectArc, Event, Freed, Opened, OpenFailed, RevokeArc
-from backbone.scheduling.explain.answers import Unservable
-from backbone.scheduling.requests import RequestState
-from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.waiting import end_tasks
 
 
@@ -22,7 +19,6 @@ class SwitchService(Protocol):
     """The interface of the RC manager for its switches."""
 
     clock: Clock
-    manager: ScheduleManager
 
     def happened(self, event: Event) -> None:
         """Pass the event to the schedule manager, and carry out its instructions."""
@@ -37,15 +33,18 @@ class ArcSwitches:
     Args:
         service: The RC manager.
         context_switch: Connects and revokes.
+        failures: Gets the ARCs that do not open their gates.
         rcs: Gets the names of RCs that failed.
         grace_s: Time that an ARC has to stop cleanly.
     """
 
-    def __init__(self, service: SwitchService, context_switch: ContextSwitch, rcs: RcWatch, grace_s: float) -> None:
-        self._service, self._context_switch, self._rcs, self._grace_s = service, context_switch, rcs, grace_s
+    def __init__(
+        self, service: SwitchService, failures: Failures, context_switch: ContextSwitch, rcs: RcWatch, grace_s: float
+    ) -> None:
+        self._service, self._failures, self._context_switch = service, failures, context_switch
+        self._rcs, self._grace_s = rcs, grace_s
         self._under_way: dict[str, asyncio.Task[None]] = {}
         self._times = SwitchTimes()
-        self._vain: dict[str, tuple[float, str]] = {}
 
     def __contains__(self, arc: str) -> bool:
         """Return whether a switch of this ARC is running."""
@@ -59,20 +58,6 @@ class ArcSwitches:
     def statistics(self) -> dict[str, float]:
         """Return numbers and times of switches."""
         return self._times.statistics()
-
-    def absences(self, unservable: Iterable[Unservable]) -> list[Absence]:
-        """Return these ARCs, and those that want time and did not open their gate when they last were connected."""
-        arcs, doing = self._service.manager.master_schedule.state.arcs, "the RC manager connects it again"
-        self._vain = {arc: vain for arc, vain in self._vain.items() if arc in arcs}
-        never = [
-            Absence(arc, since_s, why, f"waits until {until}", is_running=True)
-            for arc, since_s, why, until in unservable
-        ]
-        return never + [
-            Absence(arc, since_s, complaint, doing, is_running=True)
-            for arc, (since_s, complaint) in self._vain.items()
-            if arcs[arc].state is not RequestState.IDLE or arcs[arc].retry_s is not None
-        ]
 
     def connect(self, order: ConnectArc) -> None:
         """Connect the ARC to its RCs."""
@@ -100,15 +85,14 @@ class ArcSwitches:
         vain = await self._context_switch.connect(order, self._release_s(order.epochs))
         if vain is None:
             self._rcs.connected(order.epochs)
-            self._vain.pop(order.arc, None)
+            self._failures.end(order.arc)
             self._times.granted(order.epochs, order.arc, order.settle_s, self._service.clock.now_s())
             self._service.happened(Opened(order.arc))
             return
         if vain.failed:
             self._rcs.failed(vain.failed)
         else:
-            since_s, _complaint = self._vain.get(order.arc, (self._service.clock.now_s(), ""))
-            self._vain[order.arc] = since_s, vain.complaint
+            self._failures.begin(order.arc)
         for rc in vain.unconfirmed:
             self._rcs.does_not_answer(rc)
         self._service.happened(OpenFailed(order.arc, vain.failed))

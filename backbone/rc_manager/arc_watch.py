@@ -12,11 +12,13 @@ from typing import Protocol
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import Absence
 from backbone.component.story import StoryBook
 from backbone.errors import LinkError, Refusal
 from backbone.rc_manager.arc_switches import ArcSwitches
 from backbone.rc_manager.beats import Beats
 from backbone.rc_manager.context_switch import in_pool
+from backbone.rc_manager.failures import Failures
 from backbone.rc_manager.messages import (
     AskRequest,
     Beat,
@@ -31,6 +33,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.rc_manager.recovery import Recovery
 from backbone.scheduling.events import Departed, Event
+from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest
 from backbone.scheduling.run_times import can_be_planned
 from backbone.scheduling.views import RequestAttributes
@@ -78,12 +81,13 @@ class ArcWatch:
 
     Args:
         service: The RC manager.
+        failures: Holds the ARCs that did not open their gates.
         switches: The running context switches.
         recovery: Asks an ARC for its request.
     """
 
-    def __init__(self, service: ArcService, switches: ArcSwitches, recovery: Recovery) -> None:
-        self._service, self._switches, self._recovery = service, switches, recovery
+    def __init__(self, service: ArcService, failures: Failures, switches: ArcSwitches, recovery: Recovery) -> None:
+        self._service, self._failures, self._switches, self._recovery = service, failures, switches, recovery
         self._beats = Beats(service.clock.rate)
         self._requesting: defaultdict[str, list[Choosing]] = defaultdict(list)
 
@@ -133,6 +137,14 @@ class ArcWatch:
         """The ARCs that ask for RCs."""
         return [*dict.fromkeys([*self._beats.heard_s, *self._requesting])]
 
+    def absences(self, answers: Answers) -> list[Absence]:
+        """Return the ARCs that want time, and cannot be served or did not open their gates when last connected."""
+        never = [
+            Absence(arc, since_s, why, f"waits until {until}", is_running=True)
+            for arc, since_s, why, until in answers.unservable()
+        ]
+        return never + self._failures.absences(answers.wanting(), "the RC manager connects it again")
+
     def remember(self, arc: str) -> None:
         """Know the ARC from now on: it asks for RCs."""
         self._beats.heard(arc, self._service.clock.now_s())
@@ -141,12 +153,14 @@ class ArcWatch:
         """Know the ARC and its requests no longer, and expect no beats; return whether a request was admitted."""
         for choosing in self._requesting.get(arc, ()):
             choosing.request = None
+        self._failures.end(arc)
         return self._beats.forget(arc)
 
     def end_silent(self) -> None:
         """End the requests of ARCs that hang. Call it every ``RENEW_EVERY_S``."""
         for arc, silent_s in self._beats.look(self._service.clock.now_s()).items():
             log.warning("%s has not beaten for %.1f s", arc, silent_s)
+            self._failures.end(arc)
             self._service.happened(Departed(arc, "silent"))
 
     def heard_beat(self, envelope: Envelope[Beat]) -> None:

@@ -24,6 +24,7 @@ from typing import NamedTuple
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
 from backbone.naming import Subsystem
+from backbone.rc_manager.failures import Failures, Note
 from backbone.rc_manager.messages import (
     CloseGate,
     Connect,
@@ -45,7 +46,6 @@ ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it opens
 CONFIRM_S = 0.04  # chosen: ten round trips, within the tolerance of a trace; also for RCs that are late already
 CLOSE_S = 0.2  # chosen: an ARC shuts its gate in milliseconds; a hung ARC must not cost the next one its turn
 
-Note = Callable[[str, str], object]
 Hold = tuple[str, str, int]
 """RC, ARC and epoch."""
 
@@ -54,14 +54,12 @@ class Vain(NamedTuple):
     """A connection in vain, which is undone.
 
     Attributes:
-        failed: The RC that failed; empty if it was the ARC.
+        failed: The RC that failed; empty if the ARC did not open its gate.
         unconfirmed: RCs that did not confirm their disconnection: see ``revoke``.
-        complaint: Why the ARC did not open its gate; empty if an RC failed.
     """
 
     failed: str
     unconfirmed: list[str]
-    complaint: str
 
 
 class ContextSwitch:
@@ -69,27 +67,20 @@ class ContextSwitch:
 
     Args:
         note: Adds an event to the story of a subject.
+        failures: Gets the failures of RCs and ARCs.
         may_leave: Returns whether a switch may skip an RC that an ARC loses: it is down, or has no other holder.
     """
 
-    def __init__(self, bus: Bus, clock: Clock, note: Note, may_leave: Callable[[str, str], bool]) -> None:
-        self._bus, self._clock, self._note, self._may_leave = bus, clock, note, may_leave
+    def __init__(
+        self, bus: Bus, clock: Clock, note: Note, failures: Failures, may_leave: Callable[[str, str], bool]
+    ) -> None:
+        self._bus, self._clock, self._note, self._failures, self._may_leave = bus, clock, note, failures, may_leave
         self._given_back: set[str] = set()
-        self._complaints: dict[str, str] = {}
         self._left: defaultdict[str, dict[Hold, float]] = defaultdict(dict)
 
     def gives_back(self, arc: str) -> bool:
         """Return whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
         return arc in self._given_back
-
-    def complain(self, rc: str, what: str, error: Refusal | LinkError) -> None:
-        """Add the failure of an RC to its story, and keep it as its last one."""
-        self._note(rc, f"{what}: {error}")
-        self._complaints[rc] = _in_words(what, error)
-
-    def complaint(self, rc: str) -> str:
-        """Return the last failure of an RC."""
-        return self._complaints.get(rc, "")
 
     async def connect(self, order: ConnectArc, within_s: float) -> Vain | None:
         """Connect all RCs to the ARC and order it to open its gate, or undo all of it.
@@ -103,8 +94,7 @@ class ContextSwitch:
         """
         settled_s = self._clock.now_s() + order.settle_s
         failed = await self._connect_rcs(order)
-        complaint = "" if failed else await self._open_gate(order, settled_s)
-        if not (failed or complaint):
+        if not failed and await self._open_gate(order, settled_s):
             return None
         close = CloseGate("failed", failed or order.arc, 0.0, -1.0)
         holds, why = _holds(order.arc, order.epochs), f"failed at {failed or order.arc}"
@@ -115,7 +105,7 @@ class ContextSwitch:
                 undoing = both.create_task(self._disconnect(holds, why, self._clock.now_s() + within_s))
         finally:
             self._given_back.discard(order.arc)
-        return Vain(failed or "", undoing.result(), complaint)
+        return Vain(failed or "", undoing.result())
 
     async def revoke(self, order: RevokeArc, within_s: float) -> list[str]:
         """Close the ARC's gate and disconnect its RCs; return when all RCs are free, except skipped ones.
@@ -170,23 +160,23 @@ class ContextSwitch:
         for rc, outcome in zip(epochs, outcomes, strict=True):
             if isinstance(outcome, Refusal | LinkError):
                 log.warning("%s could not be connected to %s: %s", rc, order.arc, outcome)
-                self.complain(rc, f"could not be connected to {order.arc}", outcome)
+                self._failures.complain(rc, f"could not be connected to {order.arc}", outcome)
                 return rc
             if outcome is not None:
                 raise outcome
         return None
 
-    async def _open_gate(self, order: ConnectArc, settled_s: float) -> str:
-        """Have the ARC open its gate; return why it did not, or an empty text."""
+    async def _open_gate(self, order: ConnectArc, settled_s: float) -> bool:
+        """Have the ARC open its gate; return whether it did."""
         question = OpenGate(dict(order.epochs), settled_s, order.until_s)
         try:
             await self._bus.ask(in_pool(order.arc), question, GateOpens, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
             log.warning("%s did not open: %s", order.arc, error)
-            self._note(order.arc, f"did not open its gate: {error}")
-            return _in_words("did not open its gate", error)
+            self._failures.complain(order.arc, "did not open its gate", error)
+            return False
         await self._clock.sleep_until_s(settled_s)  # the ARC opens by the same clock: it need not report that
-        return ""
+        return True
 
     async def _close_gate(self, arc: str, question: CloseGate) -> None:
         within_s = question.deadline_s / self._clock.rate or CLOSE_S
@@ -216,7 +206,7 @@ class ContextSwitch:
                 return True
             except (Refusal, LinkError) as error:
                 if not has_complained:
-                    self.complain(rc, f"did not confirm its disconnection from {arc}", error)
+                    self._failures.complain(rc, f"did not confirm its disconnection from {arc}", error)
                 has_complained = True
                 does_not_obey = isinstance(error, Refusal)  # its hardware stops by itself if at all
             is_late = free_by_s < math.inf and (does_not_obey or self._real_s(free_by_s) < ASK_AGAIN_S)
@@ -230,10 +220,6 @@ class ContextSwitch:
     def _real_s(self, until_s: float) -> float:
         """Return the seconds until then on the machine's clock."""
         return (until_s - self._clock.now_s()) / self._clock.rate
-
-
-def _in_words(what: str, error: Refusal | LinkError) -> str:
-    return f"{what}: {error.detail if isinstance(error, Refusal) else error}"
 
 
 def _holds(arc: str, epochs: Mapping[str, int]) -> list[Hold]:

@@ -21,6 +21,7 @@ from backbone.errors import LinkError, Refusal
 from backbone.placer.messages import Start, Started
 from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch, in_pool
 from backbone.rc_manager.credibility import contradiction
+from backbone.rc_manager.failures import Failures
 from backbone.rc_manager.messages import AskRc, RcState
 from backbone.rc_manager.recovery import Found, Recovery
 from backbone.scheduling.events import CapacityChanged, Event, RcCameBack, RcWentDown
@@ -32,6 +33,7 @@ log = logging.getLogger(__name__)
 
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
 MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease, because mostly an old hold keeps an RC from connecting
+REMEDY = "examine its hardware; 'scout-backbone story {name}' shows its failures"
 MEET_LATEST_S = 16.0  # chosen: meanwhile an ARC preempted for a vain connection gets some of the papers' 5 s slices
 
 
@@ -71,15 +73,16 @@ class RcWatch:
         up: RCs that count as up.
     """
 
-    def __init__(self, service: Service, context_switch: ContextSwitch, recovery: Recovery) -> None:
+    def __init__(self, service: Service, failures: Failures, context_switch: ContextSwitch, recovery: Recovery) -> None:
         """Count no RC as up.
 
         Args:
             service: The RC manager.
+            failures: Gets the RCs that cannot be used.
             context_switch: Ends an RC's remaining holds.
             recovery: Finds the present components.
         """
-        self._service = service
+        self._service, self._failures = service, failures
         self._context_switch = context_switch
         self._recovery = recovery
         self.resources: dict[str, Resource] = {}
@@ -87,8 +90,6 @@ class RcWatch:
         self._failing: set[str] = set()
         self._pauses_s: dict[str, float] = {}
         self._meeting: Counter[str] = Counter()
-        self._faults: dict[str, str] = {}
-        self._failing_since_s: dict[str, float] = {}
         self._doubted: set[str] = set()
         self._starts: dict[str, asyncio.Task[None]] = {}
 
@@ -99,12 +100,10 @@ class RcWatch:
 
     def absences(self) -> list[Absence]:
         """Return the RCs that run and cannot be used: put aside, unsafe, silent, or connected in vain."""
-        used = {lease.rc for lease in self._service.manager.leases()} if self._failing_since_s else set()
-        return [
-            Absence(rc, since_s, self._why(rc), "the RC manager tries it again", _remedy(rc), is_running=True)
-            for rc, since_s in sorted(self._failing_since_s.items())
-            if rc not in self.up or rc in used
-        ]
+        used = {lease.rc for lease in self._service.manager.leases()}
+        return self._failures.absences(
+            used | (self.resources.keys() - self.up), "the RC manager tries it again", REMEDY
+        )
 
     def missing(self) -> list[str]:
         """Return the RCs that do not run, sorted."""
@@ -116,7 +115,7 @@ class RcWatch:
         Raises:
             Refusal: An RC cannot be started.
         """
-        missing = [rc for rc in rcs if rc not in self.up and rc not in self._faults]
+        missing = [rc for rc in rcs if rc not in self.up and rc not in self._failures.put_aside]
         for rc in missing:
             if rc not in self._starts:
                 self._starts[rc] = asyncio.create_task(self._start(self.resources[rc]), name=f"start {rc}")
@@ -138,11 +137,11 @@ class RcWatch:
         if rc not in self.resources:  # removed meanwhile
             return False
         if rc not in self.up:
-            if self._faults.pop(rc, ""):
+            if self._failures.put_aside.pop(rc, ""):
                 self._service.story.note(rc, "is credible again")
             self.up.add(rc)
             if rc not in self._pauses_s:
-                self._failing_since_s.pop(rc, None)
+                self._failures.end(rc)
             self._service.happened(RcCameBack(rc, state.last_epoch))
             if state.capacity != self.resources[rc].capacity:
                 self._service.happened(CapacityChanged(rc, state.capacity))
@@ -167,7 +166,7 @@ class RcWatch:
 
         Each retry may preempt holders of other RCs, so the wait doubles with each further connection in vain.
         """
-        self._failing_since_s.setdefault(rc, self._service.clock.now_s())
+        self._failures.begin(rc)
         self._service.changed()
         if rc not in self._failing:
             self._failing.add(rc)
@@ -177,7 +176,7 @@ class RcWatch:
         """Note that these RCs were connected."""
         for rc in rcs:
             self._pauses_s.pop(rc, None)
-            self._failing_since_s.pop(rc, None)
+            self._failures.end(rc)
 
     def failed(self, rc: str) -> None:
         """Count the RC as down after a connection in vain; the caller informs the schedule manager."""
@@ -186,10 +185,10 @@ class RcWatch:
 
     def forget(self, rc: str) -> bool:
         """Count an RC whose component is gone as down; return whether it was up or put aside."""
-        was_known = rc in self.up or bool(self._faults.pop(rc, ""))
+        was_known = rc in self.up or bool(self._failures.put_aside.pop(rc, ""))
         self.up.discard(rc)
         self._pauses_s.pop(rc, None)  # its next process may be sound
-        self._failing_since_s.pop(rc, None)
+        self._failures.end(rc)
         return was_known
 
     def does_not_answer(self, rc: str) -> None:
@@ -205,9 +204,7 @@ class RcWatch:
         if rc not in self.resources:
             return False
         if rc not in self.up:
-            if (
-                rc not in self._failing and not self._meeting[rc]
-            ):  # a check makes an RC that does not obey publish again
+            if rc not in self._failing and not self._meeting[rc]:  # a check makes a disobedient RC publish again
                 self.meet_again(rc)
             return False
         if contradiction(state, self.resources[rc], service.clock.now_s(), service.manager.epoch_of(rc)):
@@ -246,11 +243,7 @@ class RcWatch:
         finally:
             self._failing.discard(rc)
             if rc not in self.up:
-                self._failing_since_s.pop(rc, None)
-
-    def _why(self, rc: str) -> str:
-        fault = self._faults.get(rc)
-        return f"it is put aside: {fault}" if fault else self._context_switch.complaint(rc)
+                self._failures.end(rc)
 
     async def _ask(self, rc: str, given: int | None = None) -> RcState | None:
         """Return the RC's own report of its state; None if it does not answer, or is not credible and put aside."""
@@ -264,7 +257,7 @@ class RcWatch:
             return None
         except (Refusal, LinkError) as error:
             log.warning("%s did not answer with its state: %s", rc, error)
-            self._context_switch.complain(rc, "did not answer with its state", error)
+            self._failures.complain(rc, "did not answer with its state", error)
             return None
         fault = contradiction(state, resource, clock.now_s(), given)
         if fault:
@@ -283,13 +276,9 @@ class RcWatch:
     def _put_aside(self, rc: str, fault: str) -> None:
         """Plan nothing on this RC until it is credible, and continue with the others."""
         self.up.discard(rc)
-        if self._faults.get(rc) != fault:
-            self._faults[rc] = fault
+        if self._failures.put_aside.get(rc) != fault:
+            self._failures.put_aside[rc] = fault
             log.warning("%s is put aside: %s", rc, fault)
             self._service.publish_event(rc, f"is put aside: {fault}", LogLevel.WARNING)
             self._service.happened(RcWentDown(rc, fault))
         self.meet_in_a_while(rc)
-
-
-def _remedy(rc: str) -> str:
-    return f"examine its hardware; 'scout-backbone story {rc}' shows its failures"

@@ -27,6 +27,7 @@ from backbone.rc_manager.arc_switches import ArcSwitches
 from backbone.rc_manager.arc_watch import ArcWatch
 from backbone.rc_manager.context_switch import ContextSwitch
 from backbone.rc_manager.decision_log import DecisionLog
+from backbone.rc_manager.failures import Failures
 from backbone.rc_manager.hardware import Hardware
 from backbone.rc_manager.messages import (
     RENEW_EVERY_S,
@@ -76,14 +77,7 @@ from backbone.scheduling.events import (
 )
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.requests import (
-    LEASE_S,
-    Lease,
-    RequestState,
-    Scheduled,
-    SchedulingRequest,
-    UnknownRequest,
-)
+from backbone.scheduling.requests import LEASE_S, Lease, RequestState, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.views import Utilization
 from backbone.waiting import end_tasks, set_within
@@ -115,11 +109,12 @@ class RcManager(Component[RcManagerParameters]):
         self._wake_at_s: float | None = None
         self._log = DecisionLog(bus, clock, self.manager, self.story.note, self._trace_stopped)
         self.shares = self._log.shares
-        self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
+        failures = Failures(clock, self.story.note)
+        self._context_switch = ContextSwitch(bus, clock, self.story.note, failures, self._may_leave)
         self._recovery = Recovery(bus, clock)
-        self._rcs = RcWatch(self, self._context_switch, self._recovery)
-        self._switches = ArcSwitches(self, self._context_switch, self._rcs, given.grace_s)
-        self._arcs = ArcWatch(self, self._switches, self._recovery)
+        self._rcs = RcWatch(self, failures, self._context_switch, self._recovery)
+        self._switches = ArcSwitches(self, failures, self._context_switch, self._rcs, given.grace_s)
+        self._arcs = ArcWatch(self, failures, self._switches, self._recovery)
         self._hardware = Hardware(self, self._recovery, self._rcs)
         self._resources = self._hardware.resources
         self._found = Found({}, {})
@@ -164,7 +159,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def absences(self) -> list[Absence]:
         """Return RCs that cannot be used, and ARCs that want time and cannot run."""
-        return [*self._rcs.absences(), *self._switches.absences(self.answers.unservable())]
+        return [*self._rcs.absences(), *self._arcs.absences(self.answers)]
 
     # ------------------------------------------------------------------ questions
     async def answer(self, asked: Envelope[Message]) -> Message:

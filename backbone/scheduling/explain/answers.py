@@ -98,6 +98,11 @@ class Answers:
             for arc, (why, until) in never.items()
         ]
 
+    def wanting(self) -> set[str]:
+        """Return the ARCs that want time now, or want it again soon after a failed connection."""
+        arcs = self._state.arcs.values()
+        return {arc.name for arc in arcs if arc.state is not RequestState.IDLE or arc.retry_s is not None}
+
     def attributes(self, name: str) -> Attributes:
         """Return the requests of an ARC, of an owner (name or address), or of a node and its descendants.
 
