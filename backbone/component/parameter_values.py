@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 import msgspec
 
 from backbone.component.messages import WrongParameter
 
+Parameters = TypeVar("Parameters", bound=msgspec.Struct)
 
-def parameters_from(values: Mapping[str, object], kind: type[msgspec.Struct]) -> msgspec.Struct:
-    """Return the values as this class, or raise ``WrongParameter``."""
+
+def parameters_from(values: Mapping[str, object], kind: type[Parameters], of: str = "") -> Parameters:
+    """Return the values as this class.
+
+    Args:
+        of: Name of the component or resource, for the refusal; empty: the caller names it.
+
+    Raises:
+        WrongParameter: A value does not fit the class, or the class has no such parameter.
+    """
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
-        raise WrongParameter(str(error)) from None
+        raise WrongParameter(f"{of}: {error}" if of else str(error)) from None

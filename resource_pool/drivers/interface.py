@@ -22,7 +22,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.class_faults import fault_of_method
-from backbone.component.messages import WrongParameter
+from backbone.component.parameter_values import parameters_from
 from backbone.errors import Refusal
 from backbone.ranges import Share
 
@@ -71,10 +71,7 @@ class DriverSite:
         Raises:
             WrongParameter: An option is not in ``kind``, or its value is illegal.
         """
-        try:
-            return msgspec.convert(self.parameters.options, kind)
-        except msgspec.ValidationError as error:
-            raise WrongParameter(f"{self.resource}: {error}") from None
+        return parameters_from(self.parameters.options, kind, self.resource)
 
 
 class NoOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
