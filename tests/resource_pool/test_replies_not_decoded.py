@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pool_on_local_network import a_pool
-from test_replies_at_work import RADIO, RCS, SCOUT1, overhear
+from replying_pool import RADIO, RCS, SCOUT1, overhear
 
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import LogLevel, StoryEvent

@@ -38,6 +38,31 @@ def folder() -> Iterator[Path]:
         yield Path(name)
 
 
+@pytest.fixture
+def network(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return the sizes of what large conversations put to the network."""
+    sizes: list[int] = []
+
+    class Counted:
+        def __init__(self, publisher: Any) -> None:
+            self._of = publisher
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._of, name)
+
+        def put(self, raw: bytes) -> None:
+            sizes.append(len(raw))
+            self._of.put(raw)
+
+    class Outlet(zenoh_outlets.Outlet):
+        def __init__(self, key: str, publisher: Any, *others: Any) -> None:
+            super().__init__(key, Counted(publisher), *others)
+
+    monkeypatch.setattr(zenoh_outlets, "Outlet", Outlet)
+    monkeypatch.setattr(zenoh_outlets, "KNOWN_AFTER_S", 0.1)
+    return sizes
+
+
 @pytest.fixture(params=["local", "zenoh", "one host", "shared", "shared by turns"])
 def on_bus(request: pytest.FixtureRequest, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Runner:
     """Return what runs a law on one of the buses."""

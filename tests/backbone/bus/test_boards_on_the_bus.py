@@ -6,11 +6,8 @@ The laws of all publications hold for them as well (``test_bus_publications``); 
 from __future__ import annotations
 
 import asyncio
-import errno
 import os
-from itertools import cycle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +19,6 @@ from hosts_with_boards import (
     MISSION,
     PICTURE,
     SAID,
-    Host,
     Map,
     Sketch,
     host,
@@ -32,40 +28,12 @@ from hosts_with_boards import (
     until_near,
 )
 
-from backbone.blackboard import sealed_memory
-from backbone.blackboard.values import MOST_IN_PACKET
-from backbone.bus import host_boards, zenoh_outlets
 from backbone.bus.host_boards import LARGE_BYTES, boards_for
 from backbone.bus.shared_bus import SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.bus.zenoh_outlets import MOST_PUBLISHERS
 from backbone.keys import Conversation
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, WIRE_VERSION, Envelope, OversizedMessage
-
-
-@pytest.fixture
-def network(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Return the sizes of what large conversations put to the network."""
-    sizes: list[int] = []
-
-    class Counted:
-        def __init__(self, publisher: Any) -> None:
-            self._of = publisher
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self._of, name)
-
-        def put(self, raw: bytes) -> None:
-            sizes.append(len(raw))
-            self._of.put(raw)
-
-    class Outlet(zenoh_outlets.Outlet):
-        def __init__(self, key: str, publisher: Any, *others: Any) -> None:
-            super().__init__(key, Counted(publisher), *others)
-
-    monkeypatch.setattr(zenoh_outlets, "Outlet", Outlet)
-    monkeypatch.setattr(zenoh_outlets, "KNOWN_AFTER_S", 0.1)
-    return sizes
 
 
 async def test_pictures_leave_the_network_and_are_neither_old_nor_doubled(folder: Path, network: list[int]) -> None:
@@ -264,43 +232,6 @@ async def test_a_large_output_reaches_this_host_and_a_longer_one_is_refused(fold
             sender.publish(AT, Conversation.EVENTS, picture(8, size))
 
 
-@pytest.mark.parametrize("at", ["sealed", "mapped"])
-async def test_without_memory_or_descriptors_pictures_go_by_the_network(
-    folder: Path, network: list[int], monkeypatch: pytest.MonkeyPatch, at: str
-) -> None:
-    def refuse(*_: object) -> None:
-        raise OSError(errno.EMFILE, "Too many open files")
-
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
-        send = sending(sender, sent, 2 * MOST_IN_PACKET)
-        await until_near(network, send)
-        with monkeypatch.context() as patched:
-            patched.setattr(sealed_memory, at, refuse)
-            send()
-            count = len(heard.all)
-            await until(lambda: len(heard.all) > count + 5, "they are heard", send)
-        await asyncio.sleep(host_boards.LOOK_EACH_S)
-        await until_near(network, send)
-        assert heard.numbers() == sorted(set(heard.numbers()))
-
-
-async def test_an_unreadable_value_on_a_board_is_counted_and_skipped(folder: Path, network: list[int]) -> None:
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
-        await until_near(network, send := sending(sender, sent))
-        sender.publish(AT, SAID, Sketch(1, "x" * PICTURE))
-        await until(lambda: listener.statistics().unreadable == 1, "it is counted")
-        send()
-        await heard.until(lambda all_: all_[-1].body.number == len(sent), "the next picture")
-
-
 async def test_neighbors_get_the_object_and_other_processes_the_board(folder: Path, network: list[int]) -> None:
     endpoint = free_endpoint()
     hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
@@ -327,21 +258,6 @@ async def test_neighbors_get_the_object_and_other_processes_the_board(folder: Pa
     assert list((folder / "board").iterdir()) == []
 
 
-async def test_a_lost_board_sends_the_listener_to_the_network_at_once(folder: Path, network: list[int]) -> None:
-    """The board alone is lost, such as with a folder that somebody removed; its sender goes on."""
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
-        await until_near(network, send := sending(sender, sent))
-        sender._outlet(AT, SAID).board.close()  # type: ignore[union-attr]  # noqa: SLF001
-        count = len(heard.all)
-        await until(lambda: len(heard.all) > count, "it is heard again", send)
-        await until_near(network, send)
-        assert heard.numbers() == sorted(set(heard.numbers()))
-
-
 async def test_who_publishes_under_ever_new_addresses_does_not_collect_boards(folder: Path) -> None:
     """As a framegrabber does for each ARC that holds it."""
     async with host(folder) as near:
@@ -352,52 +268,3 @@ async def test_who_publishes_under_ever_new_addresses_does_not_collect_boards(fo
         assert len(files) <= 2 * MOST_PUBLISHERS
         await sender.close()
         assert list((folder / "board").iterdir()) == []
-
-
-async def test_a_member_that_moved_to_another_process_is_heard_there(folder: Path, network: list[int]) -> None:
-    endpoint = free_endpoint()
-    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
-    here, there = (SharedSession(MISSION, endpoint, "", str(folder)) for _ in range(2))
-    listener, other = here.join(ASKER, CLOCK), there.join(THIRD, CLOCK)
-    heard, sent = Heard(), list[int]()
-    listener.subscribe(AT, SAID, Map, heard, latest=True)
-    for session in (here, there, here):
-        sender = session.join(SERVER, CLOCK)
-        turns = cycle([sending(other, sent), sending(sender, sent)])  # at once, only the newest would be heard
-        before = len(heard.all)
-        await until(
-            lambda n=before: {SERVER, THIRD} <= {e.source for e in heard.all[n:]},  # type: ignore[misc]
-            "both are heard",
-            lambda turns=turns: next(turns)(),  # type: ignore[misc]
-        )
-        await sender.close()
-    for bus in (listener, other):
-        await bus.close()
-    for session in (here, there):
-        await session.close()
-    await hub.close()
-
-
-async def test_pictures_go_on_while_there_is_no_hub(folder: Path, network: list[int]) -> None:
-    endpoint = free_endpoint()
-    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
-    near = Host(endpoint, folder)
-    sender, listener = near.join(SERVER), near.join(ASKER)
-    heard, sent, links = Heard(), list[int](), Heard()
-    listener.watch_link(links)
-    listener.subscribe(AT, SAID, Map, heard, latest=True)
-    await until_known(listener, sender)
-    await until_near(network, send := sending(sender, sent))
-    await hub.close()
-    await links.until(lambda all_: all_[-1] is False, "the link is lost")
-    for _ in range(20):
-        send()
-        await heard.until(lambda all_: all_[-1].body.number == len(sent), "the newest picture without a hub")
-    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
-    await links.until(lambda all_: all_[-1] is True, "the link is back")
-    await until_near(network, send)
-    count = len(heard.all)
-    await until(lambda: len(heard.all) > count + 5, "pictures go on", send)
-    assert heard.numbers() == sorted(set(heard.numbers()))
-    for bus in (sender, listener, hub):
-        await bus.close()
