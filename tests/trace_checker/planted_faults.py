@@ -8,12 +8,11 @@ to say: a late grant within the tolerance is none, and the end of a slice may be
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 from random import Random
-from typing import Any
 
-Line = dict[str, Any]
-Planter = Callable[[list[Line], Random], bool]
+from trace_checker.contents_of_lines import CONTENTS, Planter
+from trace_checker.places_in_traces import move, next_of, place_of, rcs_of, somewhere
+from trace_checker.trace_format import Line
 
 PLANTERS: dict[str, Planter] = {}
 
@@ -29,31 +28,10 @@ def _planter(function: Planter) -> Planter:
     return function
 
 
-def _place(lines: list[Line], rng: Random, *events: str) -> int | None:
-    """Return where one of the lines with these events is."""
-    places = [place for place, line in enumerate(lines) if line["ev"] in events]
-    return rng.choice(places) if places else None
-
-
-def _next(lines: list[Line], after: int, arc: str, *events: str) -> int | None:
-    for place in range(after + 1, len(lines)):
-        if lines[place].get("arc") == arc and lines[place]["ev"] in events:
-            return place
-    return None
-
-
-def _move(lines: list[Line], place: int, time_s: float) -> None:
-    """Put the line to another time, behind all lines of that time."""
-    line = lines.pop(place)
-    line["t"] = time_s
-    behind = [at for at, other in enumerate(lines) if other["t"] <= time_s]
-    lines.insert(behind[-1] + 1 if behind else 0, line)
-
-
 # ---------------------------------------------------------------------- lines that are missing
 def _drops(event: str) -> None:
     def drop(lines: list[Line], rng: Random) -> bool:
-        place = _place(lines, rng, event)
+        place = place_of(lines, rng, event)
         if place is not None:
             del lines[place]
         return place is not None
@@ -85,10 +63,10 @@ for _event in [
 @_planter
 def switch_is_missing(lines: list[Line], rng: Random) -> bool:
     """An ARC's revocation, and that it is free."""
-    place = _place(lines, rng, "revoke")
+    place = place_of(lines, rng, "revoke")
     if place is None:
         return False
-    free = _next(lines, place, lines[place]["arc"], "free")
+    free = next_of(lines, place, lines[place]["arc"], "free")
     for one in (free, place):
         if one is not None:
             del lines[one]
@@ -98,11 +76,11 @@ def switch_is_missing(lines: list[Line], rng: Random) -> bool:
 @_planter
 def start_is_missing(lines: list[Line], rng: Random) -> bool:
     """An ARC's connect and grant, with all that follows of that run."""
-    place = _place(lines, rng, "connect")
+    place = place_of(lines, rng, "connect")
     if place is None:
         return False
     arc = lines[place]["arc"]
-    until = _next(lines, place, arc, "connect") or len(lines)
+    until = next_of(lines, place, arc, "connect") or len(lines)
     gone = {"connect", "grant", "revoke", "free", "slice", "extend"}
     lines[place:until] = [line for line in lines[place:until] if line.get("arc") != arc or line["ev"] not in gone]
     return True
@@ -150,11 +128,11 @@ def time_runs_backwards(lines: list[Line], rng: Random) -> bool:
 
 def _shifts(kind: str, event: str, least_s: float, most_s: float) -> None:
     def shift(lines: list[Line], rng: Random) -> bool:
-        place = _place(lines, rng, event)
+        place = place_of(lines, rng, event)
         if place is None:
             return False
         time_s = round(lines[place]["t"] + rng.uniform(least_s, most_s), 3)
-        _move(lines, place, min(max(time_s, 0.0), lines[-1]["t"]))
+        move(lines, place, min(max(time_s, 0.0), lines[-1]["t"]))
         lines.sort(key=lambda line: line["ev"] == "end")
         return True
 
@@ -187,26 +165,26 @@ def everything_after_some_time_is_later(lines: list[Line], rng: Random) -> bool:
 @_planter
 def run_begins_early(lines: list[Line], rng: Random) -> bool:
     """The connect and the grant of one run, both by the same time."""
-    place = _place(lines, rng, "connect")
-    grant = None if place is None else _next(lines, place, lines[place]["arc"], "grant")
+    place = place_of(lines, rng, "connect")
+    grant = None if place is None else next_of(lines, place, lines[place]["arc"], "grant")
     if place is None or grant is None:
         return False
     by_s = rng.uniform(0.05, 3.0)
     for one in (grant, place):
-        _move(lines, one, round(max(0.0, lines[one]["t"] - by_s), 3))
+        move(lines, one, round(max(0.0, lines[one]["t"] - by_s), 3))
     return True
 
 
 @_planter
 def run_begins_late(lines: list[Line], rng: Random) -> bool:
-    place = _place(lines, rng, "connect")
-    grant = None if place is None else _next(lines, place, lines[place]["arc"], "grant")
+    place = place_of(lines, rng, "connect")
+    grant = None if place is None else next_of(lines, place, lines[place]["arc"], "grant")
     if place is None or grant is None:
         return False
     by_s = rng.uniform(0.05, 3.0)
     end_s = lines[-1]["t"]
     for one in (grant, place):
-        _move(lines, one, round(min(end_s, lines[one]["t"] + by_s), 3))
+        move(lines, one, round(min(end_s, lines[one]["t"] + by_s), 3))
     lines.sort(key=lambda line: line["ev"] == "end")
     return True
 
@@ -219,37 +197,14 @@ def line_stands_twice(lines: list[Line], rng: Random) -> bool:
     return True
 
 
-def _active(lines: list[Line], before: int) -> dict[str, str]:
-    """Return the last step of each ARC that has asked and not left."""
-    last: dict[str, str] = {}
-    for line in lines[:before]:
-        if line["ev"] in ("request", "connect", "grant", "revoke", "free", "idle", "depart"):
-            last[line["arc"]] = line["ev"]
-    return {arc: step for arc, step in last.items() if step != "depart"}
-
-
-def _somewhere(lines: list[Line], rng: Random, *steps: str) -> tuple[int, str] | None:
-    """Return a place and an ARC whose last step before it was one of these."""
-    for _ in range(20):
-        place = rng.randrange(1, len(lines))
-        found = [arc for arc, step in _active(lines, place).items() if step in steps]
-        if found:
-            return place, rng.choice(found)
-    return None
-
-
-def _rcs_of(lines: list[Line], arc: str) -> list[str]:
-    return next((list(line["use"]) for line in lines if line["ev"] == "request" and line["arc"] == arc), [])
-
-
 def _adds(kind: str, steps: tuple[str, ...], *added: Line) -> None:
     def add(lines: list[Line], rng: Random) -> bool:
-        found = _somewhere(lines, rng, *steps)
+        found = somewhere(lines, rng, *steps)
         if found is None:
             return False
         place, arc = found
         time_s = lines[place]["t"]
-        epochs = dict.fromkeys(_rcs_of(lines, arc), 1000)
+        epochs = dict.fromkeys(rcs_of(lines, arc), 1000)
         lines[place:place] = [
             {"t": time_s, "arc": arc, **line, **({"epoch": epochs} if line["ev"] == "grant" else {})} for line in added
         ]
@@ -282,10 +237,10 @@ _adds("line_of_unknown_kind", ("request", "free", "grant"), {"ev": "jump"})
 
 def _adds_for_rc(kind: str, line: Line) -> None:
     def add(lines: list[Line], rng: Random) -> bool:
-        held = _place(lines, rng, "grant", "connect")
+        held = place_of(lines, rng, "grant", "connect")
         if held is None:
             return False
-        rcs = _rcs_of(lines, lines[held]["arc"])
+        rcs = rcs_of(lines, lines[held]["arc"])
         place = held + rng.choice([0, 0, 1])
         lines.insert(place, {"t": lines[held]["t"], "id": rng.choice(rcs or ["nothing"]), **line})
         return True
@@ -298,117 +253,4 @@ _adds_for_rc("rc_has_no_capacity_left", {"ev": "rc_cap", "cap": 0.05})
 _adds_for_rc("rc_has_half_its_capacity", {"ev": "rc_cap", "cap": 0.5})
 
 
-# ---------------------------------------------------------------------- other contents
-def _changes(kind: str, event: str, change: Callable[[Line, Random], bool]) -> None:
-    def alter(lines: list[Line], rng: Random) -> bool:
-        place = _place(lines, rng, event)
-        return place is not None and change(lines[place], rng)
-
-    PLANTERS[kind] = alter
-
-
-def _sets(kind: str, event: str, /, **fields: Any) -> None:
-    def put(line: Line, _: Random) -> bool:
-        line.update(fields)
-        return True
-
-    _changes(kind, event, put)
-
-
-_sets("another_mode", "meta", mode="strict")
-_sets("another_discipline", "meta", discipline="time")
-_sets("no_grace", "meta", grace=0.0)
-_sets("long_grace", "meta", grace=2.0)
-_sets("wide_tolerance", "meta", tol=0.3)
-_sets("relaxed_work", "meta", wc="relaxed")
-_sets("slow_to_connect", "rc", connect=0.7)
-_sets("slow_to_disconnect", "rc", disconnect=0.4)
-_sets("quick_to_connect", "rc", connect=0.0)
-_sets("small_capacity", "rc", cap=0.3)
-_sets("unit_instead_of_sharable", "rc", kind="unit")
-_sets("unknown_arc", "grant", arc="nobody")
-_sets("unknown_rc", "rc_state", id="nothing")
-_sets("short_min_run", "request", min_run=0.5)
-_sets("long_min_run", "request", min_run=9.0, max_run=9.0)
-_sets("unknown_owner", "request", owner="m/nobody")
-_sets("console_above_all", "request", owner={"ui": 9, "id": "planted"})
-_sets("console_below_all", "request", owner={"ui": -9, "id": "planted"})
-_sets("node_above_its_siblings", "node", prio=9)
-_sets("revoked_for_another_reason", "revoke", why="higher")
-_sets("revoked_for_no_reason", "revoke", why="slice")
-_sets("no_epoch_at_all", "grant", epoch={})
-
-
-@_planter
-def epoch_of_an_earlier_grant(lines: list[Line], rng: Random) -> bool:
-    place = _place(lines, rng, "grant")
-    if place is None or not lines[place].get("epoch"):
-        return False
-    rc = rng.choice(sorted(lines[place]["epoch"]))
-    lines[place]["epoch"][rc] -= rng.choice([1, 1, 2])
-    return True
-
-
-@_planter
-def field_is_missing(lines: list[Line], rng: Random) -> bool:
-    line = rng.choice(lines)
-    fields = sorted(set(line) - {"by", "idle", "epoch"})
-    del line[rng.choice(fields)]
-    return True
-
-
-@_planter
-def two_arcs_change_names(lines: list[Line], rng: Random) -> bool:
-    """From some time on."""
-    arcs = sorted({line["arc"] for line in lines if "arc" in line})
-    if len(arcs) < 2:
-        return False
-    one, other = rng.sample(arcs, 2)
-    names = {one: other, other: one}
-    for line in lines[rng.randrange(len(lines)) :]:
-        if line.get("arc") in names:
-            line["arc"] = names[line["arc"]]
-    return True
-
-
-@_planter
-def uses_another_rc(lines: list[Line], rng: Random) -> bool:
-    place = _place(lines, rng, "request")
-    if place is None:
-        return False
-    rcs = [line["id"] for line in lines if line["ev"] == "rc"]
-    lines[place]["use"][rng.choice(rcs)] = "x"
-    return True
-
-
-@_planter
-def streams_cost_more(lines: list[Line], rng: Random) -> bool:
-    streams = [
-        stream
-        for line in lines
-        if line["ev"] == "request"
-        for use in line["use"].values()
-        if isinstance(use, list)
-        for stream in use
-    ]
-    if not streams:
-        return False
-    rng.choice(streams)["cost"] *= rng.choice([1.5, 2.0])
-    return True
-
-
-@_planter
-def streams_are_due_early(lines: list[Line], rng: Random) -> bool:
-    streams = [
-        stream
-        for line in lines
-        if line["ev"] == "request"
-        for use in line["use"].values()
-        if isinstance(use, list)
-        for stream in use
-    ]
-    if not streams:
-        return False
-    stream = rng.choice(streams)
-    stream["deadline"] = round(stream["cost"] * rng.choice([0.9, 1.0, 1.5, 2.0]), 6)
-    return True
+PLANTERS.update(CONTENTS)
