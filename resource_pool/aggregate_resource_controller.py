@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import logging
 import operator
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, TypeVar
@@ -30,17 +29,7 @@ from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import (
-    AskRequest,
-    CloseGate,
-    Done,
-    GateClosed,
-    GateOpens,
-    Leases,
-    OpenGate,
-    TakePath,
-    Withdraw,
-)
+from backbone.rc_manager.messages import AskRequest, CloseGate, Done, GateClosed, GateOpens, Leases, OpenGate, TakePath
 from backbone.scheduling.requests import Usage
 from backbone.scheduling.run_times import require_runtime
 from backbone.waiting import set_within
@@ -77,7 +66,6 @@ from resource_pool.owner_watch import OwnerWatch
 from resource_pool.placed_request import PlacedRequest
 from resource_pool.set_lease import SetLease
 
-log = logging.getLogger(__name__)
 W = TypeVar("W")
 
 PREPARE_S = 0.9  # chosen: less than the RC manager's limit for the opening, so the gate opens in time or never
@@ -114,7 +102,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._notices = OwnerNotices(bus, clock, self._owner, note)
         self._lease, self._leased = SetLease(self.name, clock.rate), asyncio.Event()
         self._slice = ArcSlice(bus, clock, self._gate, self._owner, longest_s=self._longest_s, note=note)
-        self._owner_watch = OwnerWatch(bus, clock, self._owner, state=self._arc_state, end=self.end, note=note)
+        self._owner_watch = OwnerWatch(bus, clock, self._owner, note)
         self._manager_watch = ManagerWatch(bus)
         self._able = ArcCommands(launch.type, self.commands, self.roles, self.body)
         self._offering: asyncio.Task[None] | None = None
@@ -185,8 +173,8 @@ class AggregateResourceController(Component[ArcParameters]):
     async def serve(self) -> None:
         """Send the request, then watch owner and RC manager until the ARC ends."""
         self.start_task(self._notices.send(), "notify owner")
-        self.start_task(self._owner_watch.watch(), "watch owner")
-        self.start_task(self._owner_watch.beat(), "beat")
+        self.start_task(self._end_without_owner(), "watch owner")
+        self.start_task(self._beat(), "beat")
         self.start_task(self._watch_lease(), "watch lease")
         await self._send_request()
         self.start_task(self._manager_watch.watch(self._send_request), "watch RC manager")
@@ -194,11 +182,7 @@ class AggregateResourceController(Component[ArcParameters]):
     async def drain(self) -> None:
         """Give the set back."""
         self._gate.close("self", "", -1.0)
-        if self._placed.request is not None:
-            try:
-                await self.bus.ask(RC_MANAGER, Withdraw(self.name, "self"), Done, within_s=RC_REPLY_S)
-            except (LinkError, Refusal) as error:  # its RCs are freed by this ARC's death or when their leases expire
-                log.info("not withdrawn: %s", error)
+        await self._placed.withdraw()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Carry out orders of the RC manager for the gate, and orders of the owner for everything else."""
@@ -374,6 +358,15 @@ class AggregateResourceController(Component[ArcParameters]):
         )
 
     # ------------------------------------------------------------------ watching
+    async def _end_without_owner(self) -> None:
+        self.end(await self._owner_watch.wait_gone())
+
+    async def _beat(self) -> None:
+        """Publish heartbeats; end if the owner does not know this ARC."""
+        while not (why := await self._owner_watch.beat(self._arc_state())):
+            await self._owner_watch.wait_turn()
+        self.end(why)
+
     def _heard_leases(self, envelope: Envelope[Leases]) -> None:
         self._owner_watch.leases_renewed()
         if self._lease.heard(envelope.body, envelope.stamp_s, self._gate.epochs):

@@ -29,51 +29,45 @@ class OwnerWatch:
         bus: For questions and heartbeats.
         clock: The mission's clock.
         owner: Address of the decision process.
-        state: Returns the ARC's state, which the ARC sends to the owner with each heartbeat question.
-        end: Ends the ARC for this reason.
         note: Subject, event → the story.
     """
 
-    def __init__(
-        self,
-        bus: Bus,
-        clock: Clock,
-        owner: str,
-        *,
-        state: Callable[[], ArcState],
-        end: Callable[[str], object],
-        note: Callable[[str, str], object],
-    ) -> None:
-        self._bus, self._clock, self._owner = bus, clock, owner
-        self._state, self._end, self._note = state, end, note
+    def __init__(self, bus: Bus, clock: Clock, owner: str, note: Callable[[str, str], object]) -> None:
+        self._bus, self._clock, self._owner, self._note = bus, clock, owner, note
+        self._place_s = crc32(component_of(bus.source).encode()) % 1000 / 1000 * BEAT_SPREAD_S
         self._renewed = asyncio.Event()
 
     def leases_renewed(self) -> None:
         """Schedule the next heartbeat soon."""
         self._renewed.set()
 
-    async def watch(self) -> None:
-        """End the ARC when its owner is gone."""
+    async def wait_gone(self) -> str:
+        """Wait until the owner is gone; return that as the reason for which the ARC ends."""
         owner = PeerMonitor(self._bus, self._owner, gone_after_s=OWNER_GONE_S)
         try:
             await owner.wait_gone()
         finally:
             owner.close()
-        self._end(f"its owner {self._owner} is gone")
+        return f"its owner {self._owner} is gone"
 
-    async def beat(self) -> None:
-        """Publish a heartbeat after each renewal of leases, while this ARC and its owner live."""
-        arc = component_of(self._bus.source)
-        place_s = crc32(arc.encode()) % 1000 / 1000 * BEAT_SPREAD_S
-        while True:
-            self._renewed.clear()
-            try:
-                await self._bus.ask(self._owner, AskBeat(self._state()), Noted, within_s=OWNER_BEAT_S)
-            except (NotMyArc, UnknownMessage) as refusal:
-                self._end(f"its owner does not know it: {refusal.detail}")
-            except (LinkError, Refusal) as error:  # also of a hook of the owner, which has learned the ARC's state
-                self._note(self._owner, f"does not answer: {error}")
-            else:
-                self._bus.publish(self._bus.source, Conversation.BEAT, Beat(arc))
-            if await set_within(self._renewed, BEAT_WITHIN_S):
-                await self._clock.sleep_s(place_s * self._clock.rate)
+    async def beat(self, state: ArcState) -> str:
+        """Publish a heartbeat if the owner answers; return why the ARC must end, or an empty text.
+
+        Args:
+            state: The ARC's present state, which the owner gets with the question.
+        """
+        self._renewed.clear()
+        try:
+            await self._bus.ask(self._owner, AskBeat(state), Noted, within_s=OWNER_BEAT_S)
+        except (NotMyArc, UnknownMessage) as refusal:
+            return f"its owner does not know it: {refusal.detail}"
+        except (LinkError, Refusal) as error:  # also of a hook of the owner, which has learned the ARC's state
+            self._note(self._owner, f"does not answer: {error}")
+        else:
+            self._bus.publish(self._bus.source, Conversation.BEAT, Beat(component_of(self._bus.source)))
+        return ""
+
+    async def wait_turn(self) -> None:
+        """Wait for the next renewal of leases, at most ``BEAT_WITHIN_S``, and then for this ARC's place after it."""
+        if await set_within(self._renewed, BEAT_WITHIN_S):
+            await self._clock.sleep_s(self._place_s * self._clock.rate)

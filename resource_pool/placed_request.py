@@ -105,6 +105,15 @@ class PlacedRequest:
             return False
         return True
 
+    async def withdraw(self) -> None:
+        """Give the set back; without an answer its RCs are freed by the ARC's death, or when their leases expire."""
+        if self.request is None:
+            return
+        try:
+            await self._bus.ask(RC_MANAGER, Withdraw(self._arc, "self"), Done, within_s=RC_REPLY_S)
+        except (LinkError, Refusal) as error:
+            log.info("not withdrawn: %s", error)
+
     def take_path(self, path: list[PathNode]) -> None:
         """Use this priority path from now on."""
         if self.request is not None:

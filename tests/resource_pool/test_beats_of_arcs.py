@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections import defaultdict
 from typing import Any
 
@@ -17,7 +16,7 @@ from backbone.keys import Conversation
 from backbone.rc_manager.messages import BEAT_WITHIN_S, RENEW_EVERY_S, Beat, Leases
 from backbone.wire import Envelope, UnknownMessage
 from resource_pool.arc_listener import NotMyArc
-from resource_pool.messages import AskBeat, Noted
+from resource_pool.messages import ArcState, AskBeat, Noted
 from resource_pool.owner_watch import BEAT_SPREAD_S, OwnerWatch
 
 ROBOTS = ["scout1", "scout2", "radio"]
@@ -77,7 +76,7 @@ def test_only_an_owner_that_does_not_know_its_arc_ends_it(refusal: Refusal, ends
         network, clock = LocalNetwork(), VirtualClock()
         owner, arc = network.join("mission_control/watch", clock), network.join("resource_pool/drive", clock)
         ear = network.join("ui_console/ear", clock)
-        refusals, ended, beats = [refusal], list[str](), list[Beat]()
+        refusals, beats = [refusal], list[Beat]()
 
         async def answer(_asked: Envelope[AskBeat]) -> Noted:
             if refusals:
@@ -86,10 +85,13 @@ def test_only_an_owner_that_does_not_know_its_arc_ends_it(refusal: Refusal, ends
 
         owner.serve(owner.source, AskBeat, answer)
         ear.subscribe(arc.source, Conversation.BEAT, Beat, lambda heard: beats.append(heard.body))
-        watch = OwnerWatch(arc, clock, owner.source, state=lambda: None, end=ended.append, note=lambda *_: None)
-        beating = asyncio.create_task(watch.beat())
-        await clock.sleep_s(2 * BEAT_WITHIN_S)
-        assert (bool(ended), not refusals, beats != []) == (ends, True, True)
-        beating.cancel()
+        watch = OwnerWatch(arc, clock, owner.source, note=lambda *_: None)
+        state = ArcState("drive", "drive", owner.source, {}, False, {}, "", "", -1.0)
+        why = await watch.beat(state)
+        assert (bool(why), not refusals, beats) == (ends, True, [])
+        await watch.wait_turn()
+        assert not await watch.beat(state)
+        await clock.sleep_s(1.0)
+        assert beats == [Beat("drive")]
 
     run_virtual(main())
