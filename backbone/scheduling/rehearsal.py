@@ -248,10 +248,6 @@ class Timetable:
         since_s = self._waiting_since_s.get(arc)
         return max(self._worst_wait_s.get(arc, 0.0), 0.0 if since_s is None else self.end_s - since_s)
 
-    def waits_at_end(self, arc: str) -> bool:
-        """Return whether the ARC waits when the trace ends."""
-        return arc in self._waiting_since_s
-
     def utilization(self) -> dict[str, float]:
         """Return, for each RC, the share of the time, 0 to 1, in which ARCs could use it; a sharable RC by streams."""
         used_s = defaultdict(float, dict.fromkeys(self._rcs, 0.0))

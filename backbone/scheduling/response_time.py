@@ -23,7 +23,7 @@ priority assignment and feasibility of static priority tasks with arbitrary star
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import Literal
 
@@ -73,9 +73,7 @@ def worst_response_us(streams: Sequence[Stream], place: int) -> int | None:
     return _worst_us(streams[place], above, _blockings_us(streams)[place], enough_us=0)
 
 
-def feasible_order(
-    streams: Sequence[Stream], capacity: float, before: Callable[[int, int], bool] = lambda _a, _b: False
-) -> list[int] | None:
+def feasible_order(streams: Sequence[Stream], capacity: float) -> list[int] | None:
     """Return an order in which every packet is done by its deadline, if there is one.
 
     The lowest place is assigned first, to any stream that is in time there. The choice never spoils the rest, because a
@@ -85,7 +83,6 @@ def feasible_order(
     Args:
         streams: In any order.
         capacity: Part of its time that the RC may give, 0 to 1.
-        before: ``before(a, b)``: stream number a must stay above stream number b. A strict partial order.
 
     Returns:
         Numbers of the streams, highest first; None: there is no such order.
@@ -96,7 +93,7 @@ def feasible_order(
     order: list[int] = []
     longest_us = 1  # of the lower streams
     while remaining:
-        lowest = next(_fit_below_all(streams, remaining, longest_us - 1, before), None)
+        lowest = next(_fit_below_all(streams, remaining, longest_us - 1), None)
         if lowest is None:
             return None
         remaining.remove(lowest)
@@ -153,17 +150,13 @@ def _blockings_us(streams: Sequence[Stream]) -> list[int]:
     return blockings
 
 
-def _fit_below_all(
-    streams: Sequence[Stream], remaining: Sequence[int], blocking: int, before: Callable[[int, int], bool]
-) -> Iterator[int]:
+def _fit_below_all(streams: Sequence[Stream], remaining: Sequence[int], blocking: int) -> Iterator[int]:
     """Yield the streams that may have the lowest remaining place and are in time there; longest deadline first."""
     for number in reversed(remaining):
-        others = [other for other in remaining if other != number]
-        if any(before(number, other) for other in others):
-            continue
         above = _Load()
-        for other in others:
-            above.add(streams[other])
+        for other in remaining:
+            if other != number:
+                above.add(streams[other])
         if _in_time(streams[number], above, blocking):
             yield number
 
