@@ -70,11 +70,6 @@ def row_of(message: Recorded, commanded_by: str = "", *, splits_lists: bool = Tr
     return row
 
 
-def columns_of(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return all columns of these rows: the common ones first, then in the order in which they appear."""
-    return list(dict.fromkeys((*FIRST_COLUMNS, *(column for row in rows for column in row))))
-
-
 def _flat(value: Any, path: str, *, splits_lists: bool) -> Iterator[tuple[str, Any]]:
     if isinstance(value, dict):
         for name, inner in value.items():

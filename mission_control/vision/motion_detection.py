@@ -121,20 +121,6 @@ def noise_bar(difference: NDArray[np.float32]) -> float:
     return max(LEAST_DIFFERENCE, MEAN_DIFFERENCES * float(difference.mean()))
 
 
-def changed_pixels(average: NDArray[np.float32], picture: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return the pixels that differ from the average by more than noise.
-
-    Args:
-        average: Grey levels, shape (height, width).
-        picture: Grey levels, the same shape.
-
-    Returns:
-        True where the difference exceeds ``LEAST_DIFFERENCE`` and ``MEAN_DIFFERENCES`` times its mean.
-    """
-    difference = np.asarray(cv2.absdiff(picture, average), np.float32)
-    return np.asarray(difference > noise_bar(difference), np.bool_)
-
-
 def torn_rows(changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the rows that changed as a whole because the link tore them, shape (height,).
 

@@ -11,8 +11,6 @@ import math
 from mission_control.vision.landmark import Sighting
 from mission_control.vision.target_pose import (
     PIXEL_ERROR_PX,
-    SCOUT_CAMERA,
-    CameraModel,
     TargetPose,
     estimate_poses,
     refine_pose,
@@ -27,8 +25,7 @@ WORSE = 12.0  # chosen: in squared pixel errors; at this difference the other si
 class PoseFilter:
     """The robot's pose, from all sightings so far."""
 
-    def __init__(self, camera: CameraModel = SCOUT_CAMERA) -> None:
-        self._camera = camera
+    def __init__(self) -> None:
         self._hypotheses: list[tuple[TargetPose, float]] = []
         self._refuted = 0
 
@@ -60,14 +57,14 @@ class PoseFilter:
         """
         kept = []
         for before, badness in self._hypotheses:
-            pose = refine_pose(sighting, before, self._camera)
+            pose = refine_pose(sighting, before)
             if pose is not None and pose.residual_px < REFUTED_PX:
                 kept.append((pose, FORGETTING * badness + _squared(pose)))
         if not kept:
             self._refuted += 1
             if self._hypotheses and self._refuted < REFUTATIONS:
                 return None
-            kept = [(pose, _squared(pose)) for pose in estimate_poses(sighting, self._camera)]
+            kept = [(pose, _squared(pose)) for pose in estimate_poses(sighting)]
             kept = [(pose, badness) for pose, badness in kept if pose.residual_px < REFUTED_PX]
         self._refuted = 0
         kept.sort(key=lambda hypothesis: hypothesis[1])
