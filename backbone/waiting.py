@@ -67,7 +67,7 @@ def bug_of(task: asyncio.Task[Any]) -> BaseException | None:
 
 
 async def only_bugs(work: Awaitable[T], name: str = "") -> T:
-    """Return the result of the work, or raise what it raises as an ``Exception``; only what is ``PASSING`` passes.
+    """Return the result of the work; raise its exceptions as an ``Exception``, except those in ``PASSING``.
 
     No caller handles the others: a ``SystemExit`` would end the event loop, for all components of the process, and an
     exception of a library in another language would end the component without a drain.
@@ -127,12 +127,12 @@ class _OwnThread(Executor):
 
 
 async def in_thread_within(work: Callable[[], T], within_s: float | None) -> T:
-    """Return what the work returns, done in a thread of its own while the event loop goes on.
+    """Do the work in a thread of its own, while the event loop continues; return its result.
 
-    Work that hangs holds up neither who waits nor the end of the process: its thread is left to itself.
+    Work that hangs delays neither its caller nor the end of the process, because nothing waits for its thread.
 
     Raises:
-        TimeoutError: It takes longer than these seconds of the machine; None: it may take for ever.
+        TimeoutError: The work takes longer than ``within_s`` seconds of the machine. None: it has no time limit.
     """
     done = partial(contextvars.copy_context().run, work)
     async with asyncio.timeout(within_s):

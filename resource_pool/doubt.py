@@ -1,6 +1,6 @@
 """Doubt: the uncertainty of a dead-reckoned pose, as the covariance of place and heading.
 
-On the way out an error of the heading adds to the error of the place; on the way back it takes some of that away.
+On the way out an error of the heading adds to the error of the place; on the way back it reduces that error again.
 Errors of way and turn are independent, so variances grow in proportion to both.
 
 Source: Thrun, Burgard and Fox, "Probabilistic Robotics", 2005, section 3.3: prediction of an extended Kalman filter.

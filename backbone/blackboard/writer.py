@@ -244,7 +244,7 @@ class BlackboardWriter:
                 connection = sealed_memory.accept(self._listening)
             except BlockingIOError:
                 return
-            except OSError as error:  # no descriptors are left: who connects waits
+            except OSError as error:  # no descriptors are left: a new reader waits
                 log.warning("no further reader for now: %s", error)
                 self._events.remove(self._listening.fileno())
                 self._accept_again_s = time.monotonic() + ACCEPT_AGAIN_S

@@ -20,7 +20,7 @@ from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES
 
 FOLDER = "board"
 LARGE_BYTES = 16_384  # chosen: a board is quicker at every size, but costs ten descriptors, and most outputs are small
-LOOK_EACH_S = 1.0  # chosen: as for recorders; a look takes some 20 µs
+LOOK_EACH_S = 1.0  # chosen: as for recorders; one check takes some 20 µs
 
 log = logging.getLogger(__name__)
 

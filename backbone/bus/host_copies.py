@@ -29,7 +29,7 @@ HEADER = struct.Struct("<IIH")
 """Length of the envelope, copies dropped so far (modulo 2³²), length of the key."""
 MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: a quarter of a second of four cameras in color; little memory for an RC
 SMALL_BYTES = 4096  # chosen: to copy a page takes less time than a second system call
-LOOK_EACH_S = 1.0  # chosen: a late recorder misses at most so much of a sending process; a look takes 20 µs
+LOOK_EACH_S = 1.0  # chosen: a late recorder misses at most this time of a sending process; one check takes 20 µs
 
 log = logging.getLogger(__name__)
 

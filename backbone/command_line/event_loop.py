@@ -35,8 +35,8 @@ def exit_code_of(work: Callable[[], Awaitable[int]]) -> int:
 def interruptible() -> Iterator[None]:
     """Let Ctrl-C, SIGTERM and a closed terminal end the block at once and in good order, although it awaits nothing.
 
-    By default Ctrl-C only cancels the coroutine, which notices that when it awaits, and so after its work; the others
-    end the process where it is, and half a file would stay.
+    By default Ctrl-C only cancels the coroutine, and the coroutine notices that only when it awaits, after its work.
+    The other signals end the process at once, and may leave half a file.
     """
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, *orders_to_end())}
     heeded = [number for number, handler in before.items() if handler is not signal.SIG_IGN]  # as a shell's background

@@ -166,8 +166,8 @@ class ConsoleObserver:
     async def _tell_holders(self, bus: Bus, clock: Clock) -> None:
         """Print the holders whenever they have changed, until the mission is down.
 
-        Until the last run begins, which cancels this, the published schedule is not subscribed to: it is worked out
-        twice a second as long as it is heard.
+        The begin of the last run cancels this. It does not subscribe to the published schedule, because the RC manager
+        would then compute the schedule twice a second.
         """
         decided = asyncio.Event()
         bus.subscribe(RC_MANAGER, Conversation.EVENTS, TraceLine, lambda _line: decided.set())

@@ -36,9 +36,8 @@ MOST_PORT = 65_535  # RFC 9293: a port has 16 bits
 class CommandTable(TyperGroup):
     """Shows each command's whole summary, and converts only values that need conversion.
 
-    Typer cuts summaries at the end of the line. It also loads pydantic to convert a value, even if the value is absent,
-    is a text that a command wants as it is, or a shell asks for completions; that import takes a third of the processor
-    time of a short command, and on a full machine each part of that time is waited for.
+    Typer cuts summaries at the end of the line. It also imports pydantic to convert a value, even for an absent value,
+    a plain text, or the completions of a shell. This import takes a third of the processor time of a short command.
     """
 
     def __init__(self, **attributes: Any) -> None:
@@ -110,7 +109,7 @@ def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
 
 
 def _processed(parameter: Any, process_value: Callable[[Any, Any], Any], ctx: Any, value: object) -> Any:
-    """Return the value as the command gets it; an absent optional value, or one beside completions, stays as it is."""
+    """Return the value for the command; an absent optional value, or a value during completion, stays unchanged."""
     if (value is None and not parameter.required) or ctx.resilient_parsing:
         return value
     given = process_value(ctx, value)

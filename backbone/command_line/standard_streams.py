@@ -35,7 +35,7 @@ def standard_streams() -> Iterator[None]:
         if error.filename is not None or error.errno not in (*_NO_ROOM, errno.EPIPE):
             raise
         _drop_output()
-        if error.errno != errno.EPIPE:  # who reads no further knows it
+        if error.errno != errno.EPIPE:  # a reader that has stopped knows it
             say(f"the output cannot be written: {error.strerror} (Write it to a disk that has room.)")
         sys.exit(ExitCode.UNEXPECTED)
 
@@ -55,7 +55,7 @@ def _open_closed_ones() -> None:
 
 
 def _drop_output() -> None:
-    """Send to nowhere what is still to be written, so that the interpreter does not complain at its end."""
+    """Drop the text that is not written yet, so that the interpreter does not complain at its end."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, sys.stdout.fileno())
     os.close(null)

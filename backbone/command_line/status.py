@@ -1,7 +1,7 @@
 """``scout-backbone status``: the mission picture once, or again and again, also of a mission whose hub is away.
 
-Rule of this file: it loads no screen; ``tables`` does. On a full machine a command waits for the processor longer than
-for all its answers, and a screen takes a fifth of its time, which programs that read JSON need not wait for.
+Rule of this file: it loads no screen; ``tables`` does. The import of a screen takes a fifth of the command's time, and
+programs that read JSON need no screen.
 """
 
 from __future__ import annotations

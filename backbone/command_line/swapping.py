@@ -30,7 +30,7 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
 
     Raises:
         UnknownModule: Nothing of the mission that can be exchanged has this name.
-        Silent: What has this name does not answer; nothing was changed.
+        Silent: The component of this name does not answer; nothing was changed.
         Refusal: The new one cannot take the place; nothing was changed.
         OutcomeUnknown: It did not answer.
     """
@@ -73,7 +73,7 @@ async def addressed(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
 
     Raises:
         UnknownModule: Nothing of the mission that can be exchanged has this name.
-        Silent: What has this name, or may run it, does not answer or is not up.
+        Silent: The component of this name, or a unit that may run it, does not answer or is not up.
     """
     listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
     units = [one.address for one in listed.components if one.type == EXECUTION_UNIT]

@@ -39,5 +39,5 @@ class MissionTables:
 
 def console_of_width(width: int | None) -> Console:
     """Return a console for tables; None: as wide as the terminal."""
-    # What stands in a cell came over the bus: square brackets in it are text, and no markup.
+    # The text of a cell came over the bus, so square brackets in it are text and no markup.
     return Console(width=width, markup=False, emoji=False, highlight=False)

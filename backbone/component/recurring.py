@@ -1,4 +1,4 @@
-"""Recurring trouble: said when it begins, and once when it has stayed away; what comes between is only counted.
+"""Recurring trouble: reported when it begins, and once after it has stayed away; recurrences in between are counted.
 
 Rules of this file: pure; times are arguments, of any clock.
 """

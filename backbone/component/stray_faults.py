@@ -1,7 +1,7 @@
 """Stray faults: those of a component's code that reach neither its hooks nor its tasks, told in its story.
 
-A coroutine that is never awaited, a task or a thread of its own that fails: Python writes them to the log alone, and
-the component goes on as if nothing had happened.
+If a coroutine is never awaited, or a task or thread of its own fails, Python only writes a line to the log, and the
+component continues.
 """
 
 from __future__ import annotations

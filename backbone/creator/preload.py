@@ -1,7 +1,7 @@
 """Modules that a creator's zygote imports beforehand: components start sooner, and share the memory of these modules.
 
-A module that only one component uses is imported beforehand, too: an import after the fork writes into many pages that
-the component shares with its zygote, and repeats imports that other components make, too. Only shipped modules are: a
+A module that only one component uses is imported beforehand, too. An import after the fork would write into many pages
+that the component shares with its zygote, and would repeat imports of other components. Only shipped modules are: a
 restarted component gets the preloaded code, and the files of others are edited while a mission runs.
 
 Pure.

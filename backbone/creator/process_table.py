@@ -6,8 +6,8 @@ has a session of its own and the name of its parent. It ends its children by its
 for that.
 
 All components of a zygote share its session, because Linux may give each session the same part of the processor
-(autogroup, sched(7)): with a session each, forty starting components go before a command typed at a terminal, and no
-niceness of one counts against another.
+(autogroup, sched(7)). If each component had a session, forty starting components would delay a command typed at a
+terminal, and their niceness would have no effect on each other.
 """
 
 from __future__ import annotations

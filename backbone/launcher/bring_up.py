@@ -141,7 +141,7 @@ async def _with_hub(
 
 
 async def end_mission(bus: Bus, *, at_once: bool = False) -> MissionEnding:
-    """Order the launcher to take its mission down; return what the last branch does meanwhile.
+    """Order the launcher to take its mission down; return the state of the last branch.
 
     Raises:
         LinkError: The launcher did not answer.

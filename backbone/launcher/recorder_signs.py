@@ -37,7 +37,7 @@ class RecorderSigns:
 async def watch(signs: asyncio.StreamReader, silent: Callable[[bool], None]) -> None:
     """Call ``silent(True)`` when no signs come, and ``silent(False)`` when they come again; return at the end.
 
-    When: once the recorder has said that it listens; before, who began it limits the time.
+    When: after the recorder has reported that it listens. Until then, the component that started it limits the time.
     """
     late, some = 0, b"\n"
     while some:

@@ -1,6 +1,6 @@
 """Reads a mission file in a forked child, so that the readers of mission files take no memory of the launcher: 12 MB.
 
-If the child gives no answer, this process reads, and meets what the child met.
+If the child does not answer, this process reads the file itself, and has the same fault as the child.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Forked child: does one piece of work, so that what it imports takes no memory of this process."""
+"""Forked child: does one piece of work, so that the modules it imports take no memory of this process."""
 
 from __future__ import annotations
 
@@ -61,4 +61,4 @@ def _do(work: Callable[[], bytes], inlet: int) -> None:
                 answer = answer[os.write(inlet, answer) :]
             code = 0
     finally:
-        os._exit(code)  # not sys.exit: what the caller has buffered is not the child's to print
+        os._exit(code)  # not sys.exit: the child must not print the caller's buffered text

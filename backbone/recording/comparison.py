@@ -21,7 +21,7 @@ Named = tuple[str, str, str]
 
 
 class Absent(StrEnum):
-    """What stands in place of a value that one recording lacks; null is a value, such as of a number that was NaN."""
+    """Replaces a value that one recording lacks. Null is a value, such as of a number that was NaN."""
 
     ABSENT = "absent"
 

@@ -43,7 +43,7 @@ def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
     known: dict[str, type[Message]] = {}
     for schema, kinds in named.items():
         only = [path for path in kinds if path.partition(".")[0] in packages] or list(kinds)
-        if len(only) == 1:  # else the names of one class would stand beside the values of the other
+        if len(only) == 1:  # else a record would have the names of one class with the values of the other
             known[schema] = kinds[only[0]]
         if len(kinds) > 1:
             nameless = " and ".join(sorted(path for path, kind in kinds.items() if known.get(schema) is not kind))

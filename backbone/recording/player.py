@@ -93,8 +93,8 @@ class Player:
     def begin(self) -> None:
         """Answer questions, and publish the present states. Call it after ``catch_up``.
 
-        The keys of messages that are read ahead are prepared here, later ones in gaps, because serving an address and
-        declaring a publisher takes milliseconds, which the next message may not leave.
+        Prepare the keys of the messages that are read ahead, and later keys in gaps between messages. It takes
+        milliseconds to serve an address or to declare a publisher, and the next message may be due earlier.
         """
         for address in self._mission.there:
             self._serve(address)

@@ -234,9 +234,9 @@ def open_file(path: Path) -> IO[bytes]:
 def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
     """Return sender → number of messages missing between its first and its last, only for senders that miss any.
 
-    Each sender numbers its messages, and begins anew when it was restarted; what is missing between two lives is not
-    known. A number is missing if its message was lost, if its key was not recorded, or if it is a question without an
-    answer.
+    Each sender numbers its messages, and a restarted sender begins again. Messages that are missing between the end of
+    a sender and its restart are unknown. A number is missing if its message was lost, if its key was not recorded, or
+    if it is a question without an answer.
 
     Args:
         messages: In the order of sending.

@@ -1,4 +1,4 @@
-"""Recovering: a whole recording of what is readable of one that is damaged, or whose recorder was killed.
+"""Recovering: writes the readable messages of a damaged recording, or of a killed recorder, to a whole recording.
 
 Rules of this file: a damaged chunk costs its own messages alone, and is counted. Of a file that is cut, or damaged
 between two chunks, the messages before that place are kept, and the command prints the length of the rest.
@@ -23,7 +23,7 @@ _CHUNK_BYTES = 49  # MCAP specification, op 0x06: all but the compression's name
 
 
 class Recovered(NamedTuple):
-    """What was written, and what was not.
+    """The messages that were written, and the parts of the file that were not.
 
     Attributes:
         messages: Number of messages in the new recording.
@@ -98,7 +98,7 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
             raise NoRecording(
                 f"no recording: {why}", remedy="Name a recording; this file has nothing of one."
             ) from error
-        read_to = size if has_all else read_to  # what follows is the index, which is made anew
+        read_to = size if has_all else read_to  # the index follows; it is written again
     whole.finish()
     return Recovered(whole.messages, lost, size - read_to)
 
@@ -109,7 +109,7 @@ def _size(chunk: Chunk) -> int:
 
 
 def recover_file(path: Path, to: Path) -> Recovered:
-    """Write what is readable of a recording to a new file, which is there only if this succeeds.
+    """Write the readable messages of a recording to a new file; the file exists only if this succeeds.
 
     Raises:
         NoRecording: It is none.

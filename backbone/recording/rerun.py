@@ -1,8 +1,8 @@
 """Rerun: runs components for real, on virtual time; the recording supplies everything around them.
 
 They get the recorded publications, tokens and questions at their recorded times. Their questions get the recorded
-answers, not earlier than recorded. What they send to each other is what they send now. All their messages are kept, to
-be compared with those of the recorded components.
+answers, not earlier than recorded. To each other they send new messages, not the recorded ones. All their messages are
+kept, to be compared with those of the recorded components.
 """
 
 from __future__ import annotations
@@ -204,7 +204,7 @@ class _RecordedNetwork(LocalNetwork):
 
     def _learn(self) -> None:
         """Find out when the components lived, and which answers the recorded ones gave them."""
-        asked: dict[str, tuple[str, str, Message]] = {}  # id → who asked, who was asked, question
+        asked: dict[str, tuple[str, str, Message]] = {}  # id → asker, asked component, question
         for message in self._recording.messages():
             address, is_asked = address_of(message.key), message.key.endswith(f"/{Conversation.ASK}")
             life = self.lives.get(message.source)
@@ -227,7 +227,7 @@ class _RecordedNetwork(LocalNetwork):
     async def play(self, bus: Bus, clock: Clock) -> None:
         """Publish the others' messages at their recorded times; return after the last message of a real component.
 
-        Of what was sent before the first of them began, only tokens have an effect: none of them could hear the rest.
+        Of the messages sent before the first of them began, only tokens have an effect: none of them got the others.
         """
         end_s = max(life.end_s for life in self.lives.values())
         for message in self._recording.messages(until_s=end_s):

@@ -92,8 +92,8 @@ class Commanders:
     Therefore the owner of that ARC commanded the robot's actions, and the view of its camera.
 
     Args:
-        newest_first: The same messages in the opposite order. The holder of a robot and the person at a console stand
-            in a recording only after the first messages of both; ``TOLD_IN`` has the keys that are needed.
+        newest_first: The same messages in the opposite order. A recording names the holder of a robot, and the person
+            at a console, only after the first messages of both. ``TOLD_IN`` has the keys of these messages.
     """
 
     def __init__(self, newest_first: Iterable[Recorded] = ()) -> None:

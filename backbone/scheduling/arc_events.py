@@ -32,7 +32,7 @@ from backbone.scheduling.transitions import Transitions, because
 
 _NO_USE = RcUse()
 RETRY_S = 1.0  # chosen: first retry of an ARC that cannot open its gate; each retry may preempt lower ARCs
-LONGEST_RETRY_S = 30.0  # chosen: as long as an owner waits that asked in vain again and again; some whole slices
+LONGEST_RETRY_S = 30.0  # chosen: as long as an owner waits after repeated refusals; some whole slices
 
 
 class ArcEvents:

@@ -13,7 +13,7 @@ from backbone.scheduling.precedence import by_precedence
 from backbone.scheduling.response_time import Analysis, admissible
 from backbone.scheduling.streams import Stream, exceeds
 
-SETS_REMEMBERED = 4096  # chosen: sets of users of one RC; a group of 30 meets some hundred between two arrivals
+SETS_REMEMBERED = 4096  # chosen: sets of users of one RC; a group of 30 has some hundred between two arrivals
 
 
 class Compatibility:

@@ -171,7 +171,7 @@ class ArcEntry:
 
     @property
     def understates(self) -> bool:
-        """Whether its packets take longer than its present request says."""
+        """Whether its packets take longer than its present request states."""
         return self.measured is not self.streams
 
     def served(self, now_s: float) -> bool:

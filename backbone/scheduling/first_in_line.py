@@ -141,7 +141,7 @@ class FirstInLine:
         return found
 
     def _around_of(self, arc: ArcEntry) -> _Around:
-        """Return what surrounds the ARC at its RCs; it is collected anew when one of them has changed."""
+        """Return the neighbors of the ARC at its RCs; they are collected again after a change of one of these RCs."""
         versions = self._state.rc_versions
         version = self._state.service_version + sum([versions.get(rc, 0) for rc in arc.uses])
         known = self._around.get(arc)

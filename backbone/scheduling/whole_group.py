@@ -172,7 +172,7 @@ class WholeGroupPlanner:
         return any(after.start_s(other) > without.start_s(other) + INSTANT_S for other in waiting)
 
     def _needs_more(self, arc: ArcEntry, keepers: Sequence[ArcEntry], due: Sequence[ArcEntry]) -> bool:
-        """Return whether the ARC does not fit beside the holders, or not beside holders and other due ARCs."""
+        """Return whether the ARC does not fit together with the holders, or not with the holders and other due ARCs."""
         others = [other for other in due if other is not arc]
         return not (self._table.fits(arc, keepers) and self._table.fits(arc, [*keepers, *others]))
 

@@ -3,8 +3,8 @@
 The simulated drivers, a radio on a serial port and a grabber behind V4L2 all fit these protocols. A mission names a
 driver: one of ``BUILT_IN`` for its kind, or ``package.module:Class``.
 
-RCs ask ``hasattr`` for optional methods: a driver may pass calls on to another, and then ``isinstance`` with a protocol
-says no from Python 3.12 on.
+RCs ask ``hasattr`` for optional methods, because a driver may forward its calls to another object. From Python 3.12 on,
+``isinstance`` with a protocol is false for such a driver.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class DriverSite:
         tell: Publishes one line in the mission's log.
         fail: Ends the RC because of this bug or fault. Its creator restarts the RC, which opens the device again.
         folder: Cache folder of the mission on this machine; None: no folder.
-        remark: Shows one line beside the RC's state until the next one; empty: nothing.
+        remark: Shows one line with the RC's state until the next line; empty: nothing.
     """
 
     resource: str

@@ -74,7 +74,7 @@ def _kind(name: str, meaning: str = "") -> dict[str, JsonValue]:
     return {"kind": name, "meaning": meaning} if meaning else {"kind": name}
 
 
-# Readers stand behind the limits: pydantic leaves limits that stand behind a reader out of its JSON schema.
+# In a type the limits come before the reader: pydantic omits limits after a reader from its JSON schema.
 _DECIMAL_TEXT = BeforeValidator(_read_decimal)
 _WHOLE_TEXT = BeforeValidator(_read_whole)
 

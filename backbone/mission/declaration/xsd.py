@@ -1,8 +1,8 @@
 """The XML schema of mission files, for editors and other tools; made from the declared elements.
 
-The schema accepts every valid mission file. In one place it is more lenient than ``check``: if two counted children may
-come in any order beside repeated ones, XSD 1.0 can count only one, so the schema counts the required one, or else the
-first.
+The schema accepts every valid mission file. It is more lenient than ``check`` in one place. If two counted children may
+come in any order among repeated ones, XSD 1.0 can count only one of the two. The schema counts the required child, or
+else the first.
 """
 
 from __future__ import annotations
