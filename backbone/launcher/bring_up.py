@@ -28,7 +28,7 @@ from backbone.errors import BackboneError
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, launcher_launch, service_launch
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.launcher.launcher import LISTING_TIME_S, Launcher
-from backbone.launcher.mission_recorder import recorder_of_mission, require_new
+from backbone.launcher.mission_recorder import MissionRecorder, recorder_of_mission, require_new
 from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up, refuse_paths_of_no_message
@@ -92,17 +92,7 @@ async def _with_hub(
     keeper.use(bus)
     await keeper.wait_ready(hub.name, START_TIME_S)
     observer.done("nameserver", time.monotonic() - began_s)
-    run_files.write(
-        run_files.RunFile(
-            mission=own.mission,
-            endpoint=own.endpoint,
-            launcher_pid=os.getpid(),
-            clock_origin_monotonic_s=clock.origin_monotonic_s,
-            clock_rate=clock.rate,
-            host=own.host,
-            source=description.source,
-        )
-    )
+    _write_run_file(own, clock, description.source)
     recorder = (
         recorder_of_mission(description, options.text, options.record, clock, own.run_directory)
         if options.record
@@ -119,6 +109,29 @@ async def _with_hub(
         began_s=began_s,
         recorder=recorder,
     )
+    try:
+        await _run(own, clock, launcher, recorder)
+    finally:
+        launcher.outcome.ended += await keeper.close()
+    return launcher.outcome
+
+
+def _write_run_file(own: Launch, clock: MissionClock, source: str) -> None:
+    run_files.write(
+        run_files.RunFile(
+            mission=own.mission,
+            endpoint=own.endpoint,
+            launcher_pid=os.getpid(),
+            clock_origin_monotonic_s=clock.origin_monotonic_s,
+            clock_rate=clock.rate,
+            host=own.host,
+            source=source,
+        )
+    )
+
+
+async def _run(own: Launch, clock: MissionClock, launcher: Launcher, recorder: MissionRecorder | None) -> None:
+    """Run the launcher until the mission or a signal ends it; an error becomes the failure of its outcome."""
     loop = asyncio.get_running_loop()
     orders = orders_to_end()
     for number in orders:
@@ -131,13 +144,11 @@ async def _with_hub(
     except BackboneError as error:
         launcher.outcome.failure = launcher.outcome.failure or error
     finally:
-        await bus.close()  # if the launcher was not reached
+        await launcher.bus.close()  # if the launcher was not reached
         for number in (signal.SIGINT, *orders):
             loop.remove_signal_handler(number)
         if recorder is not None:
             await recorder.end()
-        launcher.outcome.ended += await keeper.close()
-    return launcher.outcome
 
 
 async def end_mission(bus: Bus, *, at_once: bool = False) -> MissionEnding:
