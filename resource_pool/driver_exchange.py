@@ -89,6 +89,7 @@ class _DriverExchange:
     parameters: msgspec.Struct
     course: ExchangeCourse
     is_beside: bool
+    is_old_closed: bool = False
     back: asyncio.Event = field(default_factory=asyncio.Event)
     """Set when the old one works again."""
 
@@ -230,7 +231,9 @@ class DriverExchanges:
             return
         if not going.is_beside:
             going.slot.shut(has_device=False)
-            await going.slot.wait_quiet()
+            if not await self._is_quiet(going):
+                return
+            going.is_old_closed = True
             await self._close(going.old)
         within_s = going.asked.ready_within_s / self._rc.clock.rate
         if not going.is_beside:
@@ -243,11 +246,22 @@ class DriverExchanges:
         except UNPROVED as error:
             going.course.fail(self._now_s(), complaint(error))
 
+    async def _is_quiet(self, going: _DriverExchange) -> bool:
+        """Wait until no call is in progress; if a call hangs in the old driver, end the exchange."""
+        within_s = self._rc.closed_most_s  # other calls wait meanwhile
+        try:
+            async with asyncio.timeout(within_s):
+                await going.slot.wait_quiet()
+        except TimeoutError:
+            told = f"a call of {class_path_of(going.old)} did not end within {within_s:g} s"
+            going.course.fail(self._now_s(), told)
+            return False
+        return True
+
     async def _taken_over(self, going: _DriverExchange) -> None:
         """Switch to the new driver between two calls."""
         going.slot.shut()
-        await going.slot.wait_quiet()
-        if going.course.is_over:  # the new driver failed by itself meanwhile
+        if not await self._is_quiet(going) or going.course.is_over:  # the new driver failed by itself meanwhile
             return
         now_s = self._now_s()
         going.course.keeps_state = bool(going.course.tried(now_s, lambda: hand_over(going.old, going.new)))
@@ -282,7 +296,7 @@ class DriverExchanges:
             self._rc.fail(HardwareFault(f"{self._rc.name}: {hung}"))
 
     async def _returned(self, going: _DriverExchange) -> str:
-        if not going.is_beside:
+        if going.is_old_closed:
             await self._close(going.new)
             try:
                 await self._open_again(going.old)
@@ -293,7 +307,7 @@ class DriverExchanges:
         self._put_back(going)
         old, new = class_path_of(going.old), going.asked.class_path
         self._tell(going.course.outcome(old, new), LogLevel.WARNING)
-        if going.course.switched_s is not None or not going.is_beside:
+        if going.course.switched_s is not None or going.is_old_closed:
             await self._within(self._restored(going), going)
         if going.is_beside:
             await self._close(going.new)
