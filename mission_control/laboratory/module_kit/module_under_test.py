@@ -142,11 +142,20 @@ def _check_names(module: Module, inputs: Mapping[str, object]) -> None:
 def _check_values(module: str, what: str, struct: Ports) -> None:
     for port in ports_of(type(struct)):
         value, kind = getattr(struct, port.name), kinds_of_ports(type(struct))[port.name]
-        if value is not None or (what == "output" and port.is_required):
-            _check_class(f"{what} {port.name} of {module}", port, kind, value)
+        if value is not None or port.is_required:
+            check_value(f"{what} {port.name} of {module}", port, kind, value)
 
 
-def _check_class(what: str, port: Port, kind: object, value: object) -> None:
+def check_value(what: str, port: Port, kind: object, value: object) -> None:
+    """Check the value of a port.
+
+    Args:
+        what: The port, for people.
+        kind: Class of its values, as declared.
+
+    Raises:
+        ModuleRuleBroken: The value is not of the class, or could not cross the bus.
+    """
     top = typing.get_origin(kind) or kind
     is_message = isinstance(top, type) and issubclass(top, Message)
     if isinstance(top, type) and not (type(value) is top if is_message else isinstance(value, top)):

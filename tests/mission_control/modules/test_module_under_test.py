@@ -114,6 +114,8 @@ def test_inputs_that_are_not_declared_are_refused(module_under_test: MakeModule)
         doubler.update()
     with pytest.raises(ModuleRuleBroken, match="input number of doubler is sample_modules:Sum"):
         doubler.update(number=Sum(1.0))
+    with pytest.raises(ModuleRuleBroken, match="input number of doubler is builtins:NoneType"):
+        doubler.update(number=None)
 
 
 class Picture(Message, frozen=True):
@@ -231,6 +233,25 @@ def test_a_graph_runs_every_round_that_began_and_no_other(steps: list[float | st
     assert len(graph.made["twice"]) == steps.count("feed")
     assert graph.statistics().missed == 0
     assert graph.statistics().ticks == pytest.approx(10.0 * graph.now_s, abs=1.0)
+
+
+@pytest.mark.parametrize("for_s", [-1.0, float("nan"), float("inf")])
+def test_virtual_time_passes_forwards_only(for_s: float) -> None:
+    graph = GraphUnderTest(Doubler(), given=["number"], frequency_hz=1.0)
+    graph.advance(2.0)
+    with pytest.raises(ModuleRuleBroken, match="time cannot advance by"):
+        graph.advance(for_s)
+    assert graph.now_s == 2.0
+
+
+def test_a_graph_is_fed_what_its_modules_take() -> None:
+    with pytest.raises(ModuleRuleBroken, match=r"no module takes 'numbr' .did you mean 'number'"):
+        GraphUnderTest(Doubler(), given=["number", "numbr"])
+    graph = GraphUnderTest(Grey(), given=["picture"], frequency_hz=1.0)
+    for wrong in (Number(1.0), None):
+        with pytest.raises(ModuleRuleBroken, match="input picture of grey is"):
+            graph.feed("picture", wrong)  # at once, not in a later round
+    assert graph.statistics().rounds == 0
 
 
 def test_a_graph_is_checked_and_its_modules_are_watched(module_graph: type[GraphUnderTest]) -> None:
