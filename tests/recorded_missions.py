@@ -22,7 +22,7 @@ from backbone.recording.reader import Recording
 from backbone.recording.recorder import Recorder
 from backbone.recording.writer import RecordingWriter
 from backbone.wire import Envelope, Message, write
-from mission_control.laboratory.simulation import mission_run, supervised_mission, whole_mission
+from mission_control.laboratory.simulation import mission_run, supervised_mission
 from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
 from mission_control.laboratory.simulation.supervised_mission import run_supervised
 from mission_control.laboratory.simulation.whole_mission import mission_in_one_process
@@ -46,15 +46,13 @@ def record_mission(path: Path, mission: MissionDescription, lasts_s: float) -> N
             recorders.append((recorder, asyncio.create_task(recorder.run(), name="recorder")))
 
     async def record() -> None:
-        async with mission_in_one_process(mission) as running:
+        async with mission_in_one_process(mission, on=RecordedNetwork) as running:
             await running.clock.sleep_s(lasts_s)
         [(recorder, recording)] = recorders
         recorder.end()
         await recording
 
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(whole_mission, "LocalNetwork", RecordedNetwork)
-        run_virtual(record())
+    run_virtual(record())
 
 
 def record_seed(seed: int, *, chaos: bool, is_supervised: bool = False) -> tuple[Recording, MissionRun]:

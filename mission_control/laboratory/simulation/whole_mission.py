@@ -130,6 +130,7 @@ async def mission_in_one_process(
     *,
     trace: Callable[[Line], None] | None = None,
     consoles: Mapping[str, Callable[[Launch, Bus, Clock], AnyComponent]] | None = None,
+    on: Callable[[str], LocalNetwork] = LocalNetwork,
 ) -> AsyncIterator[RunningMission]:
     """Yield the mission when it is ready, on the running loop's time; end all components at the end of the block.
 
@@ -139,6 +140,7 @@ async def mission_in_one_process(
         description: A checked mission; hosts and shared processes are ignored.
         trace: Also called with each line of the schedule trace, in order.
         consoles: Component type → factory of its consoles; a mission file has no consoles.
+        on: Makes the network of a mission of this name.
 
     Raises:
         MissionFell: A component crashed; raised at the end of the block, also in place of an exception that the crash
@@ -155,7 +157,7 @@ async def mission_in_one_process(
         >>> grants = run_virtual(minute("mission.xml"))  # doctest: +SKIP
     """
     clock = VirtualClock()
-    network = LocalNetwork(description.name)
+    network = on(description.name)
     audit = Audit()
     hosts = PlayedHosts(network, clock, audit)
     bus = network.join(MEETING_AT, clock)
