@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Sequence
 
 from backbone.component.launch import Launch
 from backbone.component.logs import log_path
@@ -10,8 +12,11 @@ from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED, caus
 from backbone.creator.messages import StartFailed
 from backbone.creator.supervision import describe
 from backbone.errors import code_of
+from backbone.printable_text import printable
 
 LAST_LINES = 20
+_STACK_LINE = re.compile(r'  File "(.*)", line (\d+) in (.*)$')
+_STACK_CUT = "  ..."  # the last line of a stack of more than a hundred calls
 _LOGGED = (EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB)
 _LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
 
@@ -22,10 +27,32 @@ def last_lines(run_directory: str, name: str) -> list[str]:
 
 
 def cause_of_end(launch: Launch | None, pid: int, returncode: int) -> str:
-    """Return the bug or the refusal that ended a component; empty: another end, or its log does not say."""
-    if launch is None or not launch.run_directory or returncode not in _LOGGED:
+    """Return the bug or the refusal that ended a component, or the place at which it hung until a signal ended it.
+
+    Empty: another end, or its log does not say.
+    """
+    is_killed = returncode < 0
+    if launch is None or not launch.run_directory or not (is_killed or returncode in _LOGGED):
         return ""
-    return cause_in_log(_end_of_log(launch.run_directory, launch.process or launch.name), launch.address, pid)
+    lines = _end_of_log(launch.run_directory, launch.process or launch.name)
+    return place_of_hang(lines) if is_killed else cause_in_log(lines, launch.address, pid)
+
+
+def place_of_hang(lines: Sequence[str]) -> str:
+    """Return the place at which the main thread stood, if a log ends with the stacks of its process; else empty.
+
+    Example:
+        >>> place_of_hang(["Thread 0x01 (most recent call first):", '  File "pan.py", line 7 in update'])
+        'pan.py, line 7, in update'
+    """
+    place = None
+    whole = lines[:-1] if lines and lines[-1] == _STACK_CUT else lines
+    for line in reversed(whole):  # the main thread's stack is the last one, and its innermost call comes first
+        found = _STACK_LINE.match(line)
+        if found is None:
+            break
+        place = found
+    return printable(f"{place[1]}, line {place[2]}, in {place[3]}") if place else ""
 
 
 def _end_of_log(run_directory: str, name: str) -> list[str]:

@@ -206,12 +206,13 @@ class Supervision:
         Args:
             pid: Pid of a process that is not shared.
             returncode: Exit code, or the number of the signal that killed it, negative.
-            cause: The bug or the refusal that ended it; empty: unknown.
+            cause: The bug or the refusal that ended it, or the place at which it hung; empty: unknown.
         """
         one = next((each for each in self if each.pid == pid), None)
         if one is None:
             return []
-        return self._and_wake(self._gone(one, one.failure or describe(returncode, cause), returncode, now_s))
+        how = one.failure and f"{one.failure}{cause and ': '}{cause}"
+        return self._and_wake(self._gone(one, how or describe(returncode, cause), returncode, now_s))
 
     def left(self, name: str, returncode: int, how: str, now_s: float) -> list[Instruction]:
         """Record the end of a member of a shared process.

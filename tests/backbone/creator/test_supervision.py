@@ -146,7 +146,8 @@ def test_a_silent_process_is_shown_then_killed_then_restarted() -> None:
     assert supervision.absences(10.0)[0].since_s == pytest.approx(9.0)
     assert supervision.observed("scout1", 2.9, 11.9) == []
     assert supervision.observed("scout1", 3.0, 12.0) == [SendSignal("scout1", 7, signal.SIGKILL)]
-    assert supervision.exited(7, -9, 12.1)[0] == ReportFell("scout1", "hung: no sign of life for 3.0 s", 0.1)
+    told = "hung: no sign of life for 3.0 s: pan.py, line 7, in update"
+    assert supervision.exited(7, -9, 12.1, "pan.py, line 7, in update")[0] == ReportFell("scout1", told, 0.1)
 
 
 def test_a_beat_of_a_ready_process_searches_no_deadline() -> None:

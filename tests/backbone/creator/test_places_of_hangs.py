@@ -1,0 +1,45 @@
+"""A component that hung is reported with the line at which it stood."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+from backbone.component.launch import Launch
+from backbone.creator.failed_starts import cause_of_end
+from backbone.naming import Subsystem
+
+STACKS = """\
+12:00 INFO pan: ready
+Timeout (0:00:02.500000)!
+Thread 0x00007f01 (most recent call first):
+  File "/lib/threading.py", line 320 in wait
+
+Thread 0x00007f02 (most recent call first):
+  File "/home/anna/pan.py", line 12 in update
+  File "/lib/asyncio/runners.py", line 118 in run
+"""
+
+
+def place_in(directory: Path, log: str, returncode: int = -signal.SIGKILL) -> str:
+    at, run_directory = ("host", "endpoint", 0.0, 1.0), str(directory)
+    launch = Launch("m", Subsystem.RESOURCE_POOL, "pan", "pan", "pan:Pan", *at, run_directory=run_directory)
+    (directory / "log").mkdir(exist_ok=True)
+    (directory / "log" / "pan.log").write_text(log)
+    return cause_of_end(launch, 7, returncode)
+
+
+def test_the_place_is_that_of_the_main_thread_s_innermost_call(tmp_path: Path) -> None:
+    assert place_in(tmp_path, STACKS) == "/home/anna/pan.py, line 12, in update"
+
+
+def test_a_stack_that_the_interpreter_cuts_has_its_place_too(tmp_path: Path) -> None:
+    assert place_in(tmp_path, f"{STACKS}  ...\n") == "/home/anna/pan.py, line 12, in update"
+
+
+def test_stacks_that_are_followed_by_lines_are_of_an_earlier_hang(tmp_path: Path) -> None:
+    assert place_in(tmp_path, f"{STACKS}12:01 INFO pan: ready\n") == ""
+
+
+def test_only_a_killed_process_hung(tmp_path: Path) -> None:
+    assert place_in(tmp_path, STACKS, 0) == ""
