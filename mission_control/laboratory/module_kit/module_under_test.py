@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+MOST_HELD = 8  # chosen: inputs and outputs of four updates; a module rarely writes into more buffers in turn
 AnyModule = TypeVar("AnyModule", bound=Module)
 Pickles = Mapping[str, bytes | None]
 
@@ -118,7 +119,8 @@ def watched(module: AnyModule) -> AnyModule:
             remedy = f"Return self.Outputs(…), declared as {type_name(module.Outputs)}."
             raise ModuleRuleBroken(f"{name} returns {kind}", remedy=remedy)
         _check_values(name, "output", outputs)
-        handed_over[:] = [(inputs, _pickles(inputs)), (outputs, _pickles(outputs))]
+        handed_over.append((outputs, _pickles(outputs)))
+        del handed_over[:-MOST_HELD]
         return outputs
 
     module.update = checked  # type: ignore[method-assign]  # this one module only

@@ -21,7 +21,7 @@ def module_under_test() -> MakeModule:
     """Provide ``module_under_test(module)``: the module, fed by hand, with checks of the rules of modules.
 
     Each update checks that inputs and outputs are of the declared classes, that messages can cross the bus, and that
-    neither an input nor an output of the update before was changed. A violation raises ``ModuleRuleBroken``.
+    no input and no output of the last four updates was changed. A violation raises ``ModuleRuleBroken``.
 
     Example:
         >>> def test_smoothing_takes_its_share(module_under_test):

@@ -57,6 +57,18 @@ class KeepsItsOutput(Grey):
         return self.Outputs(self.row)
 
 
+class WritesInTurn(Grey):
+    """Has two buffers, and another module may still have the one that it fills again."""
+
+    def reset(self) -> None:
+        self.rows = [[0], [0]]
+
+    def update(self, inputs: Any) -> Any:
+        self.rows.reverse()
+        self.rows[0].append(1)
+        return self.Outputs(self.rows[0])
+
+
 class SaysNothing(Grey):
     def update(self, inputs: Any) -> Any:
         return None
@@ -88,6 +100,7 @@ class SendsMethod(Grey):
         (Whitens, "whitens changed picture of"),
         (Appends, "appends changed row of"),
         (KeepsItsOutput, "keeps-its-output changed row of"),
+        (WritesInTurn, "writes-in-turn changed row of"),
         (SaysNothing, "says-nothing returns builtins:NoneType"),
         (LeavesOut, "output row of leaves-out is builtins:NoneType, declared is list"),
         (SaysSomethingElse, "output number of says-something-else is sample_modules:Sum, declared is .*Number"),
@@ -98,12 +111,12 @@ class SendsMethod(Grey):
 def test_a_broken_rule_is_found(module_under_test: MakeModule, kind: type[Module], says: str) -> None:
     module = module_under_test(kind())
 
-    def twice() -> None:
-        for _ in range(2):
+    def thrice() -> None:
+        for _ in range(3):
             module.update(picture=np.zeros(3, np.uint8), row=[0])
 
     with pytest.raises(ModuleRuleBroken, match=says):
-        twice()
+        thrice()
 
 
 def test_inputs_that_are_not_declared_are_refused(module_under_test: MakeModule) -> None:
