@@ -4,17 +4,17 @@ The heartbeat does not use the bus, so a lost hub never makes a process seem hun
 a full disk only the line with the present step is missing. If a ready process could not create its file, it never
 counts as hung.
 
-If the event loop is blocked, a thread of the interpreter writes the stacks of the process to its log before the creator
-replaces the process. It needs neither the event loop nor the interpreter's lock.
+Before the creator replaces a process with a blocked event loop, it orders the process by ``WRITE_STACKS`` to write the
+stacks of its threads to its log. That needs neither the event loop nor the interpreter's lock.
 
 Prior art: systemd's watchdog notifications. Here the supervisor reads at its own pace.
 """
 
 from __future__ import annotations
 
-import faulthandler
 import logging
 import os
+import signal
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -26,11 +26,9 @@ from backbone.operating_system.processes import first_bytes, processor_times_s
 log = logging.getLogger(__name__)
 
 BEAT_EVERY_S = 1 / 3  # chosen: a hung process is seen within 1 s, at three wake-ups of the event loop a second
-STACKS_AFTER_S = 2.5  # chosen: below the 3 s after which a creator replaces a hung process; machine seconds
-STACKS_EVERY_BEATS = 3  # chosen: to delay the stacks starts a thread, 30 µs of processor time (measured)
+WRITE_STACKS = signal.SIGURG  # chosen: programs that a component began ignore it, as does any program by default
 DOING_BYTES = 160  # chosen: a line for people
 _FOLDER = "heartbeat"
-_STANDARD_ERROR = 2  # the process's log
 _ONE_BEAT_NS = 1_000_000_000  # chosen: every file system keeps whole seconds
 _LATEST_NS = 1_000_000_000 * _ONE_BEAT_NS  # 2001: the stamp of a file before its first beat is later
 
@@ -80,13 +78,10 @@ class Heartbeat:
     def close(self) -> None:
         """Stop writing and close the file."""
         if self._file >= 0:
-            faulthandler.cancel_dump_traceback_later()
             os.close(self._file)
             self._file = -1
 
     def _write(self) -> None:
-        if self._beats % STACKS_EVERY_BEATS == 0:
-            faulthandler.dump_traceback_later(STACKS_AFTER_S, file=_STANDARD_ERROR)
         self._beats += 1
         doing = self._doing().encode(errors="replace")[:DOING_BYTES].ljust(DOING_BYTES)
         if doing != self._said:

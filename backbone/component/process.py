@@ -17,7 +17,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
 from backbone.component.class_path import load_class
 from backbone.component.component import AnyComponent
-from backbone.component.heartbeat import Heartbeat
+from backbone.component.heartbeat import WRITE_STACKS, Heartbeat
 from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
 from backbone.component.messages import LogLevel
@@ -51,6 +51,7 @@ def run_to_end(launch: Launch, begin: Callable[[], Coroutine[object, None, None]
         begin: Called before the loop exists.
     """
     faulthandler.enable()
+    faulthandler.register(WRITE_STACKS)
     zenoh_threads.few_threads()
     component_log = ComponentLog(launch.name, launch.run_directory)
     component_log.install()

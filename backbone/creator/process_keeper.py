@@ -16,7 +16,7 @@ import msgspec
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
-from backbone.component.heartbeat import forget_heartbeat, read_vitals
+from backbone.component.heartbeat import WRITE_STACKS, forget_heartbeat, read_vitals
 from backbone.component.launch import Launch
 from backbone.component.membership import PROCESSES, read_process_address
 from backbone.component.messages import Absence, Stop, Stopping
@@ -82,7 +82,7 @@ class ProcessKeeper:
         self, zygote: Forks, clock: Clock | None = None, read_vitals: ReadVitals = read_vitals, pid: int = 0
     ) -> None:
         self.on_fell: Callable[[ProcessFell], None] = _ignore
-        self.on_silent: Callable[[str, float], None] = _ignore_silence
+        self.on_silent: Callable[[str, float], None] = _ignore
         self.on_changed: Callable[[], None] = lambda: None
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
         self._zygote, self._clock = zygote, clock or MissionClock.started_now()
@@ -278,8 +278,10 @@ class ProcessKeeper:
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
             now_s = self._now_s()
             pids = {one.pid for one in self._supervision if one.pid} | self._shared.pids()
-            for pid, silent_s, beats in self._signs.look(run_directory, pids, now_s):
-                self._observed(pid, silent_s, now_s, beats=beats)
+            for sign in self._signs.look(run_directory, pids, now_s):
+                if sign.hangs:
+                    self._zygote.kill(sign.pid, WRITE_STACKS)
+                self._observed(sign.pid, sign.silent_s, now_s, beats=sign.beats)
             trouble = self._zygote.keep_running()
             if trouble != self._zygote_trouble:
                 self._zygote_trouble, self._zygote_trouble_since_s = trouble, now_s
@@ -388,11 +390,7 @@ class ProcessKeeper:
         return self._clock.now_s() / self._clock.rate
 
 
-def _ignore(_fell: ProcessFell) -> None:
-    """Default listener: ignore the event."""
-
-
-def _ignore_silence(_name: str, _silent_s: float) -> None:
+def _ignore(*_event: object) -> None:
     """Default listener: ignore the event."""
 
 

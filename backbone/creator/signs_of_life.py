@@ -8,6 +8,8 @@ from typing import NamedTuple
 from backbone.component.heartbeat import Vitals
 from backbone.creator.silence import Silence
 
+STACKS_AFTER_S = 2.5  # chosen: below the 3 s after which a creator replaces a hung process; machine seconds
+
 ReadVitals = Callable[[str, int], Vitals | None]
 
 
@@ -18,11 +20,13 @@ class Sign(NamedTuple):
         pid: The process.
         silent_s: Seconds of the machine for which it has shown no sign of life.
         beats: True if it has written a heartbeat.
+        hangs: True once in a silence, when it is time to write the stacks of the process.
     """
 
     pid: int
     silent_s: float
     beats: bool
+    hangs: bool
 
 
 class SignsOfLife:
@@ -42,8 +46,10 @@ class SignsOfLife:
         for pid in pids:
             if (vitals := self._read_vitals(run_directory, pid)) is not None:
                 self._doing[pid] = vitals.doing
-                silent_s = self._silences.setdefault(pid, Silence()).look(vitals, now_s)
-                yield Sign(pid, silent_s, vitals.beats > 0)
+                silence, beats = self._silences.setdefault(pid, Silence()), vitals.beats > 0
+                before_s = silence.silent_s
+                silent_s = silence.look(vitals, now_s)
+                yield Sign(pid, silent_s, beats, beats and before_s < STACKS_AFTER_S <= silent_s)
 
     def doing(self, pid: int) -> str:
         """Return the present work of the process; empty if it is unknown."""

@@ -39,7 +39,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 
 CREATOR = "backbone/creator-lab"
-KINDS = ("Quiet", "Parent", "Stubborn", "Late", "Broken", "Stumbling", "Leaver", "Missing")
+KINDS = ("Quiet", "Parent", "Stubborn", "Late", "Blocked", "Broken", "Stumbling", "Leaver", "Missing")
 TYPES = [ComponentType(kind.lower(), f"sample_components:{kind}", Subsystem.RESOURCE_POOL) for kind in KINDS]
 CORE_POLICY = RestartPolicy(back_off_s=0.02, limit=20, window_s=60.0)
 POLICY = RestartPolicy(back_off_s=0.05, limit=2, window_s=60.0)

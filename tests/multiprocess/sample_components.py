@@ -37,6 +37,17 @@ class Late(Component[NoParameters]):
         time.sleep(600.0)  # noqa: ASYNC251  that is the fault
 
 
+class Blocked(Component[NoParameters]):
+    """Blocks its event loop a moment after it is ready and alive."""
+
+    async def serve(self) -> None:
+        self.start_task(self._block(), "block")
+
+    async def _block(self) -> None:
+        await self.clock.sleep_s(0.5)
+        never_returns()
+
+
 class Broken(Component[NoParameters]):
     """Ends by a bug before it is ready."""
 
@@ -72,3 +83,8 @@ def _hang() -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     time.sleep(600)
     os._exit(0)
+
+
+def never_returns() -> None:
+    while True:
+        pass

@@ -97,6 +97,17 @@ async def test_who_does_not_obey_is_killed(host: CreatorHost) -> None:
     assert time.monotonic() - began_s < 2.0
 
 
+async def test_a_component_that_blocks_its_event_loop_is_replaced_and_named_with_its_line(host: CreatorHost) -> None:
+    await host.spawn("Blocked", "scout1")
+
+    async def has_fallen() -> bool:
+        return bool(host.fell)
+
+    await soon(host, "fall", has_fallen)
+    assert host.fell[0].how.startswith("hung: no sign of life")
+    assert host.fell[0].how.endswith("in never_returns"), host.story()
+
+
 async def test_a_failed_start_shows_the_end_of_the_log(host: CreatorHost) -> None:
     with pytest.raises(StartFailed, match="the bug of the sample"):
         await host.spawn("Broken", "broken")

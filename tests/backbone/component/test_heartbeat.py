@@ -41,36 +41,6 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert vitals.ran_s > 0
 
 
-BLOCKED = """
-import asyncio, os, pathlib, sys, time
-from backbone.bus.clock import MissionClock
-from backbone.component import heartbeat
-
-heartbeat.STACKS_AFTER_S = 0.05
-
-def never_returns():
-    end_s = time.monotonic() + 20.0
-    while not os.fstat(2).st_size and time.monotonic() < end_s:
-        pass
-
-async def main():
-    beating = asyncio.create_task(heartbeat.Heartbeat(sys.argv[1]).keep(MissionClock.started_now()))
-    while not heartbeat.read_vitals(sys.argv[1], os.getpid()).beats:
-        await asyncio.sleep(0.01)
-    never_returns()
-
-asyncio.run(main())
-"""
-
-
-@pytest.mark.processes
-def test_a_blocked_event_loop_has_its_line_in_the_log(tmp_path: Path) -> None:
-    log = tmp_path / "blocked.log"
-    with log.open("w") as file:
-        subprocess.run([sys.executable, "-c", BLOCKED, str(tmp_path)], stderr=file, check=True, timeout=60)
-    assert " in never_returns" in log.read_text()
-
-
 def test_a_long_line_is_cut(tmp_path: Path) -> None:
     beat_for(str(tmp_path), 0.1, "ü" * 1000)
     vitals = read_vitals(str(tmp_path), os.getpid())

@@ -13,6 +13,7 @@ from backbone.bus.clock import VirtualClock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.class_path import load_class
 from backbone.component.component import Component, NoParameters
+from backbone.component.heartbeat import WRITE_STACKS
 from backbone.component.launch import Launch
 from backbone.component.messages import Stop
 from backbone.component.process import EXIT_BUG, EXIT_REFUSED
@@ -28,6 +29,7 @@ class InProcessZygote:
     Attributes:
         lives: Components and shared processes that run, by pid.
         forked: Names in the order in which they were forked.
+        wrote_stacks: Pids in the order in which they were ordered to write their stacks.
         refuses: Why there is no further process; empty: there is one.
     """
 
@@ -36,6 +38,7 @@ class InProcessZygote:
         self.on_lost: Callable[[], None] = lambda: None
         self.lives: dict[int, Component[Any] | SharedProcess] = {}
         self.forked: list[str] = []
+        self.wrote_stacks: list[int] = []
         self.refuses = ""
         self._network, self._next_pid = network, 1000
         self._tasks: dict[int, asyncio.Task[None]] = {}
@@ -60,7 +63,9 @@ class InProcessZygote:
     def kill(self, pid: int, number: signal.Signals) -> None:
         if pid not in self.lives:
             return
-        if number is signal.SIGKILL:
+        if number is WRITE_STACKS:
+            self.wrote_stacks.append(pid)
+        elif number is signal.SIGKILL:
             self._tasks[pid].cancel()
         else:
             self.lives[pid].end(number.name)

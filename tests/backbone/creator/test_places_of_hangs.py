@@ -11,11 +11,10 @@ from backbone.naming import Subsystem
 
 STACKS = """\
 12:00 INFO pan: ready
-Timeout (0:00:02.500000)!
 Thread 0x00007f01 (most recent call first):
   File "/lib/threading.py", line 320 in wait
 
-Thread 0x00007f02 (most recent call first):
+Current thread 0x00007f02 (most recent call first):
   File "/home/anna/pan.py", line 12 in update
   File "/lib/asyncio/runners.py", line 118 in run
 """

@@ -160,7 +160,9 @@ def test_a_ready_process_without_a_sign_of_life_is_reported_then_replaced(on_ben
         await VirtualClock().sleep_s(1.0)
         assert [absence.name for absence in bench.keeper.absences()] == ["scout1"]
         assert bench.keeper.processes()[0].silent_s > 0
+        assert bench.zygote.wrote_stacks == []
         await VirtualClock().sleep_s(POLICY.hung_after_s)
+        assert bench.zygote.wrote_stacks == [pid]
         assert pid not in bench.zygote.lives
         assert bench.keeper.processes()[0].pid in bench.zygote.lives
         assert bench.keeper.absences() == []
