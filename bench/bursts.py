@@ -17,7 +17,7 @@ from contextlib import ExitStack
 
 import uvloop
 import zenoh
-from measuring import free_endpoint, helper, report, wait_for_end_of_input
+from measuring import free_endpoint, helper, line_of, report, wait_for_end_of_input
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
@@ -98,12 +98,6 @@ def measure(way: str, pictures: int) -> tuple[int, float]:
         listener.stdin.close()
         count, last_s = json.loads(line_of(listener))
     return count, round(last_s - began_s, 3)
-
-
-def line_of(one: subprocess.Popen[bytes]) -> str:
-    """Return the next line that a process prints."""
-    assert one.stdout is not None
-    return one.stdout.readline().decode().strip()
 
 
 def main() -> None:

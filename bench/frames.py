@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import uvloop
 import zenoh
-from measuring import helper, percentile, report, summary, wait_for_end_of_input
+from measuring import helper, line_of, percentile, report, summary, wait_for_end_of_input
 
 from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
@@ -70,6 +70,7 @@ def joined(folder: str, source: str) -> tuple[ZenohBus, zenoh.Session]:
 def be_hub(folder: str) -> None:
     """Run as the hub process."""
     with zenoh.open(with_shared_memory(hub_settings([socket_endpoint(Path(folder))], [], ""))):
+        print("ready", flush=True)
         wait_for_end_of_input()
 
 
@@ -163,8 +164,7 @@ def measure(listeners: int, frames: int) -> None:
             return running.enter_context(helper(__file__, *map(str, arguments), answers=True))
 
         hub = begin("hub", folder)
-        while not socket_is_there(folder):
-            time.sleep(0.01)
+        assert line_of(hub) == "ready"
         crowd = [begin("listener", folder, f"listener-{number}") for number in range(listeners)]
         assert all(line_of(one) == "ready" for one in crowd)
         publisher = begin("publisher", folder, frames, *(one.pid for one in (hub, *crowd)))
@@ -187,17 +187,6 @@ def measure(listeners: int, frames: int) -> None:
         processor_us=processor_us,
         **ratios(listeners, {way: percentile(all_s, 0.5) for way, all_s in both.items()}, processor_us),
     )
-
-
-def socket_is_there(folder: str) -> bool:
-    """Return whether the hub listens."""
-    return Path(socket_endpoint(Path(folder)).partition("/")[2]).exists()
-
-
-def line_of(one: subprocess.Popen[bytes]) -> str:
-    """Return the next line that a process prints."""
-    assert one.stdout is not None
-    return one.stdout.readline().decode().strip()
 
 
 def main() -> None:

@@ -91,6 +91,12 @@ def helper(program: str, *arguments: str, answers: bool = False) -> Iterator[sub
             raise
 
 
+def line_of(process: subprocess.Popen[bytes]) -> str:
+    """Return the next line that a helper prints; empty: it has ended."""
+    assert process.stdout is not None
+    return process.stdout.readline().decode().strip()
+
+
 def wait_for_end_of_input() -> None:
     """Return when the process that started this helper closes its input, or dies."""
     sys.stdin.buffer.read()

@@ -17,6 +17,7 @@ import asyncio
 import queue
 import socket
 import struct
+import subprocess
 import tempfile
 import threading
 import time
@@ -28,7 +29,7 @@ from pathlib import Path
 import msgspec
 import uvloop
 import zenoh
-from measuring import helper, percentile, report, wait_for_end_of_input
+from measuring import helper, line_of, percentile, report, wait_for_end_of_input
 
 from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
@@ -50,10 +51,11 @@ MISSION, CLOCK = "bench", MissionClock(0.0)
 SIZES = (64, 1_000, 16_000, 76_800, 921_600, 10_000_000)
 SENDER, RECEIVER = (address(Subsystem.MISSION_CONTROL, name) for name in ("sender", "receiver"))
 WARM_UP = 10  # values of each way before the measurement, in which connections are set up
-BARE_KEY, OVER_KEY = "bare/values", "bare/over"
+BARE_KEY = "bare/values"
 HEAD = struct.Struct("<Qd")
 PAUSE_S, PAUSE_A_BYTE_S = 0.004, 3e-9  # chosen: no value waits for the preceding one
 READY_S = 30.0
+ARRIVES_WITHIN_S = 0.5  # chosen: so long after the last value was sent, none is on its way any more
 THREADS_HZ = 200.0  # chosen: no value waits for the preceding one
 FLOORS = {"thread": "queue", "board": "socket", "network": "zenoh"}
 LATENCIES_S: list[float] = []
@@ -210,9 +212,7 @@ async def send(folder: str, values: int) -> None:
                 for say in ways:
                     say()
                     await CLOCK.sleep_s(PAUSE_S + size * PAUSE_A_BYTE_S)
-        await CLOCK.sleep_s(0.5)
-        bare.put(OVER_KEY, b"", congestion_control=zenoh.CongestionControl.BLOCK)
-        await asyncio.get_running_loop().run_in_executor(None, wait_for_end_of_input)
+        await CLOCK.sleep_s(ARRIVES_WITHIN_S)
     await near.close()
     await far.close()
 
@@ -220,6 +220,7 @@ async def send(folder: str, values: int) -> None:
 def be_hub(folder: str) -> None:
     """Run as the hub process."""
     with zenoh.open(hub_config([socket_endpoint(Path(folder))])):
+        print("ready", flush=True)
         wait_for_end_of_input()
 
 
@@ -255,10 +256,10 @@ class Latencies:
         return p50
 
 
-async def measure(folder: str, values: int) -> dict[str, dict[int, float]]:
+async def measure(folder: str, values: int, sender: subprocess.Popen[bytes]) -> dict[str, dict[int, float]]:
     """Run as the receiving process, and report; return way → size → p50 in microseconds."""
     latencies, endpoint = Latencies(), socket_endpoint(Path(folder))
-    loop, over = asyncio.get_running_loop(), asyncio.Event()
+    loop = asyncio.get_running_loop()
 
     async def read(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
@@ -289,9 +290,8 @@ async def measure(folder: str, values: int) -> dict[str, dict[int, float]]:
             bare.declare_subscriber(f"{BARE_KEY}/{size}", lambda sample: loop.call_soon_threadsafe(arrived, sample))
             listen("board", size)
             listen("network", size)
-        bare.declare_subscriber(OVER_KEY, lambda _sample: loop.call_soon_threadsafe(over.set))
         bus.declare_alive(RECEIVER)
-        await over.wait()
+        assert await loop.run_in_executor(None, sender.wait) == 0
     await bus.close()
     server.close()
     for size in SIZES:
@@ -319,11 +319,10 @@ def main() -> None:
         uvloop.run(send(chosen.folder, chosen.values))
     else:
         plot = import_module("placements_plot") if chosen.plot is not None else None  # before it measures for minutes
-        with tempfile.TemporaryDirectory(prefix="s-") as folder, helper(__file__, "hub", folder):
-            while not Path(folder, "hub.sock").exists():
-                time.sleep(0.01)
-            with helper(__file__, "sender", folder, "--values", str(chosen.values)):
-                p50 = uvloop.run(measure(folder, chosen.values))
+        with tempfile.TemporaryDirectory(prefix="s-") as folder, helper(__file__, "hub", folder, answers=True) as hub:
+            assert line_of(hub) == "ready"
+            with helper(__file__, "sender", folder, "--values", str(chosen.values)) as sender:
+                p50 = uvloop.run(measure(folder, chosen.values, sender))
         if plot is not None:
             plot.draw(p50, FLOORS, chosen.plot)
 
