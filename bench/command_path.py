@@ -44,6 +44,7 @@ FILE = f"""<mission name="{MISSION}" priority="10">
   </behaviors>
 </mission>
 """
+TIMES = ("command_p50_s", "command_p99_s", "bare_p50_s", "bare_p99_s")
 
 
 async def measure(seconds: float) -> dict[str, float]:
@@ -71,7 +72,7 @@ def main() -> None:
     report(
         "command_path",
         commands=int(values["commands"]),
-        **{name.replace("_s", "_us"): round(value * 1e6) for name, value in values.items() if name != "commands"},
+        **{name[:-1] + "us": round(values[name] * 1e6) for name in TIMES},
         floor="one bare question through the same hub, by the same process",
         ratio=round(values["command_p50_s"] / values["bare_p50_s"], 2),
         aim=2.2,
