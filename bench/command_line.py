@@ -13,17 +13,20 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
 
 from measuring import BIN, report
+from missions import mission_up
+
+from mission_control.laboratory.module_kit.real_mission import runtime_directory
 
 MISSION = Path(__file__).parents[1] / "docs" / "examples" / "smallest.xml"
 FLOOR = (sys.executable, "-c", "pass")
 HELP_S = COMPLETION_S = 0.12  # chosen: a person perceives a tenth of a second as immediate
 STATUS_S = 0.3  # chosen: includes the mission's time to answer
+NOTHING: Mapping[str, str] = {}
 
 
 def completion(*typed: str) -> dict[str, str]:
@@ -39,8 +42,13 @@ def seconds(command: Sequence[str], environment: Mapping[str, str]) -> float:
     return time.perf_counter() - began_s
 
 
-def measure(name: str, command: Sequence[str], aim_s: float, rounds: int, environment: Mapping[str, str]) -> bool:
-    """Print one JSON line about the command, and return whether it is within its aim."""
+def measure(name: str, command: Sequence[str], aim_s: float, rounds: int, typed: Mapping[str, str] = NOTHING) -> bool:
+    """Print one JSON line about the command, and return whether it is within its aim.
+
+    Args:
+        typed: Environment of a completion.
+    """
+    environment = {**os.environ, **typed}
     took, floors = [], []
     for _ in range(rounds):
         floors.append(seconds(FLOOR, environment))
@@ -59,17 +67,6 @@ def measure(name: str, command: Sequence[str], aim_s: float, rounds: int, enviro
     return took_s <= aim_s
 
 
-@contextmanager
-def mission(environment: Mapping[str, str]) -> Iterator[None]:
-    """Keep the smallest mission up until the block ends."""
-    program = str(BIN / "scout-backbone")
-    subprocess.run([program, "up", str(MISSION), "--detach"], env=environment, check=True, capture_output=True)
-    try:
-        yield
-    finally:
-        subprocess.run([program, "down"], env=environment, check=True, capture_output=True)
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -77,24 +74,22 @@ def main() -> None:
     parser.add_argument("--aim", action="store_true")
     given = parser.parse_args()
     backbone, console = str(BIN / "scout-backbone"), str(BIN / "scout-console")
-    with tempfile.TemporaryDirectory() as folder:
-        plain = {**os.environ, "XDG_RUNTIME_DIR": folder}
-        names = {**plain, **completion("scout-backbone", "why", "")}
-        robots = {**plain, **completion("scout-console", "attach", "")}
-        commands = {**plain, **completion("scout-backbone", "st")}
+    rounds, names = given.rounds, completion("scout-backbone", "why", "")
+    with tempfile.TemporaryDirectory() as folder, runtime_directory(folder):
         within = [
-            measure("scout-backbone --help", (backbone, "--help"), HELP_S, given.rounds, plain),
-            measure("scout-console --help", (console, "--help"), HELP_S, given.rounds, plain),
-            measure("scout-backbone --version", (backbone, "--version"), HELP_S, given.rounds, plain),
-            measure("scout-backbone st<Tab>", (backbone,), COMPLETION_S, given.rounds, commands),
-            measure("scout-backbone why <Tab>, no mission", (backbone,), COMPLETION_S, given.rounds, names),
+            measure("scout-backbone --help", (backbone, "--help"), HELP_S, rounds),
+            measure("scout-console --help", (console, "--help"), HELP_S, rounds),
+            measure("scout-backbone --version", (backbone, "--version"), HELP_S, rounds),
+            measure("scout-backbone st<Tab>", (backbone,), COMPLETION_S, rounds, completion("scout-backbone", "st")),
+            measure("scout-backbone why <Tab>, no mission", (backbone,), COMPLETION_S, rounds, names),
         ]
-        with mission(plain):
-            within += [
-                measure("scout-backbone why <Tab>, mission up", (backbone,), COMPLETION_S, given.rounds, names),
-                measure("scout-console attach <Tab>, mission up", (console,), COMPLETION_S, given.rounds, robots),
-                measure("scout-backbone status, mission up", (backbone, "status"), STATUS_S, given.rounds, plain),
-            ]
+    robots = completion("scout-console", "attach", "")
+    with mission_up(MISSION):
+        within += [
+            measure("scout-backbone why <Tab>, mission up", (backbone,), COMPLETION_S, rounds, names),
+            measure("scout-console attach <Tab>, mission up", (console,), COMPLETION_S, rounds, robots),
+            measure("scout-backbone status, mission up", (backbone, "status"), STATUS_S, rounds),
+        ]
     if given.aim and not all(within):
         sys.exit(1)
 

@@ -7,14 +7,11 @@ process between two commands; see ``commanding_behavior.py``.
 from __future__ import annotations
 
 import argparse
-import os
-import tempfile
-from pathlib import Path
 
 import uvloop
 import zenoh
-from idle import mission_up
 from measuring import report
+from missions import mission_up
 from round_trip import serve_bare
 
 from backbone.bus.zenoh_bus import client_config
@@ -62,13 +59,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     seconds = parser.parse_args().seconds
-    with tempfile.TemporaryDirectory() as folder:
-        mission = Path(folder) / "mission.xml"
-        mission.write_text(FILE)
-        own = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
-        os.environ["PYTHONPATH"] = own
-        with mission_up(mission):
-            values = uvloop.run(measure(seconds))
+    with mission_up(FILE, name=MISSION):
+        values = uvloop.run(measure(seconds))
     report(
         "command_path",
         commands=int(values["commands"]),

@@ -14,17 +14,16 @@ import pty
 import struct
 import subprocess
 import sys
-import tempfile
 import termios
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import psutil
 from measuring import BIN, MISSION_XML, report
+from missions import RealMission, mission_up, own_processes
 
 COLUMNS, LINES = 120, 40
 SETTLE_S = 6.0  # chosen: imports and the first pictures are over
@@ -78,12 +77,6 @@ def busy_s(processes: list[psutil.Process]) -> float:
     return total
 
 
-def mission_processes(launcher: int) -> list[psutil.Process]:
-    """Return the processes of the mission that is up."""
-    parent = psutil.Process(launcher)
-    return [parent, *parent.children(recursive=True)]
-
-
 def turns_of_consoles() -> int:
     """Return the number of consoles' requests in the schedule."""
     done = subprocess.run([str(BIN / "scout-backbone"), "status", "--json"], capture_output=True, check=True)
@@ -91,15 +84,9 @@ def turns_of_consoles() -> int:
     return sum(request["owner"].startswith("ui_console/") for request in status["requests"])
 
 
-def launcher_pid() -> int:
-    """Return the launcher's process id from its run file."""
-    [run_file] = Path(os.environ["XDG_RUNTIME_DIR"]).glob("scout-backbone/*/run.json")
-    return int(json.loads(run_file.read_text())["launcher_pid"])
-
-
-def measure(name: str, command: list[str], lasts_s: float) -> None:
+def measure(running: RealMission, name: str, command: list[str], lasts_s: float) -> None:
     """Print one JSON line about this console."""
-    mission = mission_processes(launcher_pid())
+    mission = own_processes(running)
     if not command:
         began_s, mission_s = time.monotonic(), busy_s(mission)
         time.sleep(lasts_s)
@@ -108,7 +95,7 @@ def measure(name: str, command: list[str], lasts_s: float) -> None:
         return
     with in_a_terminal([str(BIN / command[0]), *command[1:]]) as (console, drawn):
         time.sleep(SETTLE_S)
-        mission = mission_processes(launcher_pid())
+        mission = own_processes(running)
         began_s, own_s, mission_s, bytes_before = time.monotonic(), busy_s([console]), busy_s(mission), drawn[0]
         time.sleep(lasts_s)
         took_s = time.monotonic() - began_s
@@ -130,16 +117,7 @@ def percent(busy: float, took_s: float) -> float:
 
 if __name__ == "__main__":
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 12.0
-    with tempfile.TemporaryDirectory(prefix="scout-bench-") as folder:
-        os.environ["XDG_RUNTIME_DIR"] = folder
-        backbone = str(BIN / "scout-backbone")
-        subprocess.run(
-            [backbone, "up", str(MISSION_XML), "--detach", "--headless"], check=True, stderr=subprocess.DEVNULL
-        )
-        try:
-            for console_name, console_command in CONSOLES.items():
-                if len(sys.argv) > 2 and console_name not in sys.argv[2:]:
-                    continue
-                measure(console_name, console_command, seconds)
-        finally:
-            subprocess.run([backbone, "down"], check=True, stderr=subprocess.DEVNULL)
+    with mission_up(MISSION_XML) as mission_of_consoles:
+        for console_name, console_command in CONSOLES.items():
+            if len(sys.argv) <= 2 or console_name in sys.argv[2:]:
+                measure(mission_of_consoles, console_name, console_command, seconds)

@@ -1,22 +1,18 @@
 """Cost of an idle mission: wake-ups and processor time, process by process, while no client asks anything.
 
-Prints one JSON line. A wake-up is a context switch of a thread that had waited (voluntary, from ``/proc``). The floor
-is a hub of zenoh and as many clients that only listen, with the settings of the mission's own processes.
+Prints one JSON line. A wake-up is a context switch of a thread that had waited (voluntary, from ``/proc``).
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import subprocess
-import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import psutil
-from measuring import BIN, MISSION_XML, report
+from measuring import MISSION_XML, report
+from missions import mission_up, own_processes
 
 SETTLE_S = 5.0  # chosen: the behaviors have their ARCs, and the first slices have begun
 
@@ -34,26 +30,6 @@ def processor_s(pid: int) -> float:
     """Return the processor time of a process, in seconds."""
     times = psutil.Process(pid).cpu_times()
     return times.user + times.system
-
-
-@contextmanager
-def mission_up(mission: Path) -> Iterator[psutil.Process]:
-    """Keep a mission up until the block ends; yield its launcher."""
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_RUNTIME_DIR"] = folder
-        command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
-            assert launcher.stderr is not None
-            for line in launcher.stderr:
-                if line.startswith("all ready"):
-                    break
-            else:
-                raise SystemExit("the mission did not come up")
-            try:
-                yield psutil.Process(launcher.pid)
-            finally:
-                launcher.terminate()
-                launcher.stderr.read()
 
 
 def name_of(process: psutil.Process) -> str:
@@ -79,9 +55,9 @@ def main() -> None:
     parser.add_argument("mission", nargs="?", type=Path, default=MISSION_XML)
     parser.add_argument("--seconds", type=float, default=10.0)
     given = parser.parse_args()
-    with mission_up(given.mission) as launcher:
+    with mission_up(given.mission) as running:
         time.sleep(SETTLE_S)
-        names = {one.pid: name_of(one) for one in [launcher, *launcher.children(recursive=True)]}
+        names = {one.pid: name_of(one) for one in own_processes(running)}
         found = measured(list(names), given.seconds)
     rows = sorted(((names[pid], *figures) for pid, figures in found.items()), key=lambda row: -row[1])
     report(

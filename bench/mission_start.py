@@ -7,35 +7,25 @@ seconds that the machine needs to start as many bare interpreters, two at a time
 from __future__ import annotations
 
 import argparse
-import os
 import re
-import subprocess
-import tempfile
 import time
 from statistics import median
 
-from measuring import BIN, MISSION_XML, bare_interpreters_s, report
+from measuring import END_WITHIN_S, MISSION_XML, bare_interpreters_s, report
+from missions import mission_up
 
 PROCESSES = 20  # components of that mission, core services included
 
 
 def mission_start() -> tuple[float, float]:
     """Bring the mission up and down once; return seconds by the launcher's clock and by the shell's."""
-    with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, "XDG_RUNTIME_DIR": folder}
-        command = [str(BIN / "scout-backbone"), "up", str(MISSION_XML), "--headless", "--for", "0"]
-        began_s = time.monotonic()
-        with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as launcher:
-            assert launcher.stderr is not None
-            said, ready_s = "", 0.0
-            for line in launcher.stderr:
-                said += line
-                if line.startswith("all ready"):
-                    ready_s = time.monotonic() - began_s
-            assert launcher.wait() == 0, said
-        found = re.search(r"was ready after ([\d.]+) s", said)
-        assert found is not None, said
-        return float(found.group(1)), ready_s
+    began_s = time.monotonic()
+    with mission_up(MISSION_XML) as running:
+        ready_s = time.monotonic() - began_s
+    assert running.launcher.returncode == 0, running.story()
+    found = re.search(r"was ready after ([\d.]+) s", running.wait_for_line("was ready after", END_WITHIN_S))
+    assert found is not None
+    return float(found.group(1)), ready_s
 
 
 def main() -> None:

@@ -12,18 +12,21 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import os
 import signal
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median, quantiles
 
 import psutil
 from measuring import BIN, report
-from switch_time import fast_mission, measure, switches_s
+from missions import mission_up
+from switch_time import NAME, fast_mission, measure, switches_s
 
 from backbone import run_files
 from backbone.recording.host_ear import HostEar
@@ -48,27 +51,31 @@ class Runs:
         return quantiles(self.questions_s, n=100)[98]
 
 
-def run(mission: Path, seconds: float, listener: list[str], runs: Runs) -> float:
+def run(mission: str, trace: Path, seconds: float, listener: list[str], runs: Runs) -> float:
     """Run the mission once, with or without a process that overhears it; return that process's share of a core."""
-    trace = mission.with_suffix(".jsonl")
     trace.unlink(missing_ok=True)
-    command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless", "--trace", str(trace)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
-        assert launcher.stderr is not None
-        next(line for line in launcher.stderr if line.startswith("all ready"))
-        recorder = subprocess.Popen(listener) if listener else None
-        asyncio.run(asyncio.sleep(SETTLE_S))
+    with mission_up(mission, "--trace", str(trace), name=NAME), recorder_of(listener) as recorder:
+        time.sleep(SETTLE_S)
         before_s = busy_s(recorder)
         measured = asyncio.run(measure(seconds))
         share = (busy_s(recorder) - before_s) / seconds
-        if recorder is not None:
-            recorder.send_signal(signal.SIGINT)
-            recorder.wait(20)
-        launcher.terminate()
-        launcher.stderr.read()
     runs.switches_s += switches_s(trace, measured.since_s, measured.until_s)
     runs.questions_s += measured.questions_s
     return share
+
+
+@contextmanager
+def recorder_of(listener: list[str]) -> Iterator[subprocess.Popen[bytes] | None]:
+    """Keep a process up that overhears the mission until the block ends; an empty command starts none."""
+    if not listener:
+        yield None
+        return
+    recorder = subprocess.Popen(listener)
+    try:
+        yield recorder
+    finally:
+        recorder.send_signal(signal.SIGINT)
+        recorder.wait(20)
 
 
 def busy_s(recorder: subprocess.Popen[bytes] | None) -> float:
@@ -83,7 +90,7 @@ async def overhear() -> None:
     """Receive all copies of this host and discard them, until SIGINT."""
     ended = asyncio.Event()
     asyncio.get_running_loop().add_signal_handler(signal.SIGINT, ended.set)
-    ear = HostEar(run_files.run_directory("switching"), is_of_mission=True)
+    ear = HostEar(run_files.run_directory(NAME), is_of_mission=True)
     await ear.open(lambda _key, _raw: None, lambda bug: print(bug, file=sys.stderr))
     await ended.wait()
     await ear.close()
@@ -102,14 +109,14 @@ def main() -> None:
     plain, recorded, emptied = Runs(), Runs(), Runs()
     shares, floors, messages, size, missing = [], [], 0, 0, 0
     with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_RUNTIME_DIR"] = folder
-        mission = fast_mission(Path(folder), settling=False, clean_stop=False)
+        mission, trace = fast_mission(settling=False, clean_stop=False), Path(folder) / "trace.jsonl"
         for number in range(given.rounds):
-            run(mission, given.seconds, [], plain)
+            run(mission, trace, given.seconds, [], plain)
             to = Path(folder) / f"{number}.mcap"
             record = [str(BIN / "scout-backbone"), "record", "--to", str(to)]
-            shares.append(run(mission, given.seconds, record, recorded))
-            floors.append(run(mission, given.seconds, [sys.executable, __file__, "--overhear"], emptied))
+            shares.append(run(mission, trace, given.seconds, record, recorded))
+            overhears = [sys.executable, __file__, "--overhear"]
+            floors.append(run(mission, trace, given.seconds, overhears, emptied))
             with to.open("rb") as file:
                 recording = Recording(file)
                 messages += recording.contents().messages

@@ -25,15 +25,15 @@ import subprocess
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import psutil
 from idle import name_of, processor_s
 from measuring import BIN, percentile, report
+from missions import RealMission, mission_up, own_processes
 from scale_mission import NAME, SETTLE_S, SHARING, components, mission_file
 from switch_time import switches_s
 
@@ -53,56 +53,10 @@ from ui_console.session.teleoperation import Teleoperation
 
 SIZES = [3, 10, 30, 60, 100]
 MOST_MB_A_SCOUT = 60.0  # measured: 56 before any optimization
-READY_WITHIN_S = 120.0  # chosen: allows for other work on the machine
-WHOLE_WITHIN_S = 20.0  # chosen: same; behaviors get their ARCs after all is ready
+WHOLE_WITHIN_S = 20.0  # chosen: allows for other work on the machine; behaviors get their ARCs after all is ready
 STATUS_WITHIN_S = 60.0
-END_WITHIN_S = 60.0
 ASK_EVERY_S = 0.05
 TAKE_OVER_WITHIN_S = 20.0
-
-
-@dataclass
-class Up:
-    """A mission that is up.
-
-    Attributes:
-        ready_s: Time from the shell's command to *all ready*; None: the mission did not come up.
-        said: The output of ``up`` so far.
-    """
-
-    launcher: subprocess.Popen[str]
-    ready_s: float | None
-    said: list[str]
-
-    def processes(self) -> list[psutil.Process]:
-        """Return the launcher and its descendants."""
-        own = psutil.Process(self.launcher.pid)
-        return [own, *own.children(recursive=True)]
-
-
-@contextmanager
-def mission_up(file: Path, options: Sequence[str]) -> Iterator[Up]:
-    """Bring a mission up until the block ends."""
-    began_s = time.monotonic()
-    command = [str(BIN / "scout-backbone"), "up", str(file), "--headless", *options]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
-        assert launcher.stderr is not None
-        up = Up(launcher, None, [])
-        for line in launcher.stderr:
-            up.said.append(line.rstrip())
-            if line.startswith("all ready"):
-                up.ready_s = time.monotonic() - began_s
-                break
-        try:
-            yield up
-        finally:
-            if launcher.poll() is None:
-                launcher.terminate()
-            try:
-                up.said += launcher.communicate(timeout=END_WITHIN_S)[1].splitlines()
-            except subprocess.TimeoutExpired:
-                launcher.kill()  # what it started ends with it
-                launcher.communicate()
 
 
 class Took(NamedTuple):
@@ -229,7 +183,7 @@ async def take_over(robot: str, number: int) -> float:
     return next(event.at_s for event in events if isinstance(event, CommandApplied)) - asked
 
 
-async def measure(up: Up, scouts: int, seconds: float, take_overs: int, trace: Path) -> dict[str, Any]:
+async def measure(running: RealMission, scouts: int, seconds: float, take_overs: int, trace: Path) -> dict[str, Any]:
     """Measure switches, pictures, processor time and take-overs of a mission that is up."""
     grabbers = [f"resource_pool/grabber{number}" for number in range(1, (scouts - 1) // SHARING + 2)]
     async with connected(NAME, None, "ui_console/bench") as (bus, clock):
@@ -238,9 +192,9 @@ async def measure(up: Up, scouts: int, seconds: float, take_overs: int, trace: P
             return await asyncio.gather(*(numbers_of(bus, grabber) for grabber in grabbers))
 
         since_s = clock.now_s()
-        began_s, before, first = time.monotonic(), busy(up.processes()), await pictures()
+        began_s, before, first = time.monotonic(), busy(own_processes(running)), await pictures()
         questions = await questions_s(bus, seconds)
-        then, after = await pictures(), busy(up.processes())
+        then, after = await pictures(), busy(own_processes(running))
         took_s = time.monotonic() - began_s
         taken = total(then, "frames_delivered") - total(first, "frames_delivered")
         until_s = clock.now_s()
@@ -289,31 +243,27 @@ def listed_in_time(scouts: int) -> dict[str, Any]:
 def one_size(scouts: int, given: argparse.Namespace) -> None:
     """Measure one size and print its line."""
     with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_RUNTIME_DIR"] = folder
-        file = Path(folder) / "mission.xml"
-        file.write_text(mission_file(scouts, given.pictures, given.slices))
-        trace = Path(folder) / "trace.jsonl"
-        with mission_up(file, ["--trace", str(trace), *given.up]) as up:
-            if up.ready_s is None:
-                report("scale", scouts=scouts, ready_s=None, said=up.said[-5:])
-                return
-            began = cores_by_kind({}, busy(up.processes()), 1.0)
+        trace, began_s = Path(folder) / "trace.jsonl", time.monotonic()
+        mission = mission_file(scouts, given.pictures, given.slices)
+        with mission_up(mission, "--trace", str(trace), *given.up, name=NAME) as running:
+            ready_s = time.monotonic() - began_s
+            began = cores_by_kind({}, busy(own_processes(running)), 1.0)
             listed = listed_in_time(scouts)
-            measured = asyncio.run(measure(up, scouts, given.seconds, given.take_overs, trace))
-            held, later = memory(up.processes()), status()[0]
+            measured = asyncio.run(measure(running, scouts, given.seconds, given.take_overs, trace))
+            held, later = memory(own_processes(running)), status()[0]
         report(
             "scale",
             scouts=scouts,
             asked_pictures_hz=given.pictures,
             up=given.up,
-            ready_s=round(up.ready_s, 2),
+            ready_s=round(ready_s, 2),
             ready_processor_s=began["core_percent"] / 100,
             ready_processor_percent_s_by_kind=began["core_percent_by_kind"],
             **listed,
             status_later=later._asdict(),
             **measured,
             **held,
-            ended=up.said[-1],
+            ended=running.lines[-1],
         )
 
 

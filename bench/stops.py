@@ -15,16 +15,16 @@ import asyncio
 import os
 import re
 import signal
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator, Iterator
-from contextlib import AsyncExitStack, asynccontextmanager, contextmanager, suppress
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from measuring import BIN, MISSION_XML, report
+from measuring import MISSION_XML, report
+from missions import mission_up
 from playwright.async_api import Error as PageError
 from stops_headless import Headless
 from stops_link import relay_to_mission
@@ -244,20 +244,6 @@ def _faults(silent: list[str], moving: list[str], too_many: list[str]) -> str:
 
 
 # ---------------------------------------------------------------------- the mission and its consoles
-@contextmanager
-def mission_up(folder: str) -> Iterator[None]:
-    """Keep the shipped mission up until the block ends."""
-    os.environ["XDG_RUNTIME_DIR"] = folder
-    file = Path(folder) / "mission.xml"
-    file.write_text(MISSION_XML.read_text().replace('name="iros2001"', f'name="{MISSION}"', 1))
-    backbone = str(BIN / "scout-backbone")
-    subprocess.run([backbone, "up", str(file), "--detach", "--headless"], check=True, stderr=subprocess.DEVNULL)
-    try:
-        yield
-    finally:
-        subprocess.run([backbone, "down", "--mission", MISSION], check=True, stderr=subprocess.DEVNULL)
-
-
 @asynccontextmanager
 async def console_at_hand(name: str) -> AsyncIterator[TriedConsole]:
     """Run a console whose link can be cut."""
@@ -327,7 +313,7 @@ def main() -> int:
             : words.first
         ]
     ]
-    with tempfile.TemporaryDirectory(prefix="stops-") as folder, mission_up(folder):
+    with mission_up(MISSION_XML, name=MISSION):
         rows = asyncio.run(try_all(wanted, words.within))
     if words.table is not None:
         print(markdown(rows))

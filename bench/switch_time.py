@@ -17,43 +17,37 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import os
 import re
-import subprocess
-import tempfile
 from pathlib import Path
 from statistics import quantiles
 from time import perf_counter
 from typing import NamedTuple
 
-from measuring import BIN, MISSION_XML, report
+from measuring import MISSION_XML, report
+from missions import mission_up
 
 from backbone.addresses import RC_MANAGER
 from backbone.component.messages import AskState, AskStatistics, ComponentState, Statistics
 from backbone.launcher.mission_connection import connected
 
 HALTING_WATCHER = '<type name="watch_for_motion" class="halting_watcher:HaltingWatcher" subsystem="mission_control"/>'
+NAME = "switching"
 SLICE_S = 0.3
 
 
-def fast_mission(folder: Path, *, settling: bool, clean_stop: bool) -> Path:
-    """Write the mission with short slices; return its path.
+def fast_mission(*, settling: bool, clean_stop: bool) -> str:
+    """Return the mission file with short slices.
 
     Args:
-        folder: Folder of the file.
         settling: True: the picture of a new transmitter settles in the time of the mission file; False: at once.
         clean_stop: True: the watchers must stop their robots at the end of a slice.
     """
-    text = MISSION_XML.read_text()
-    text = re.sub(r'minimum-runtime-s="[^"]*"', f'minimum-runtime-s="{SLICE_S}"', text)
-    text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', r"\g<1>switching", text, count=1)
+    text = re.sub(r'minimum-runtime-s="[^"]*"', f'minimum-runtime-s="{SLICE_S}"', MISSION_XML.read_text())
     if not settling:
         text = re.sub(r'connect-s="[^"]*"', 'connect-s="0"', text)
     if clean_stop:
         text = text.replace("  <resources>", f"  <types>{HALTING_WATCHER}</types>\n  <resources>")
-    file = folder / "mission.xml"
-    file.write_text(text)
-    return file
+    return text
 
 
 class Measured(NamedTuple):
@@ -86,7 +80,7 @@ def switches_s(trace: Path, since_s: float, until_s: float, settle_s: float = 0.
 async def measure(seconds: float) -> Measured:
     """Ask the RC manager twenty times a second for so many seconds."""
     questions = []
-    async with connected("switching", None, "ui_console/bench") as (bus, clock):
+    async with connected(NAME, None, "ui_console/bench") as (bus, clock):
         since_s = clock.now_s()
         while clock.now_s() < since_s + seconds:
             began = perf_counter()
@@ -105,19 +99,9 @@ def main() -> None:
     parser.add_argument("--clean-stop", action="store_true", help="the watchers stop their robots first")
     given = parser.parse_args()
     variant = [name for name in ("no_settling", "clean_stop") if getattr(given, name)]
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_RUNTIME_DIR"] = folder
-        mission = fast_mission(Path(folder), settling=not given.no_settling, clean_stop=given.clean_stop)
-        own = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
-        command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
-        with subprocess.Popen(
-            command, env={**os.environ, "PYTHONPATH": own}, stderr=subprocess.PIPE, text=True
-        ) as launcher:
-            assert launcher.stderr is not None
-            next(line for line in launcher.stderr if line.startswith("all ready"))
-            measured = asyncio.run(measure(given.seconds))
-            launcher.terminate()
-            launcher.stderr.read()
+    mission = fast_mission(settling=not given.no_settling, clean_stop=given.clean_stop)
+    with mission_up(mission, name=NAME):
+        measured = asyncio.run(measure(given.seconds))
     floor_s, values = quantiles(measured.questions_s, n=100)[49], measured.values
     report(
         "switch_time",

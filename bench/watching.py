@@ -21,7 +21,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import os
 import subprocess
 import sys
 import tempfile
@@ -31,7 +30,8 @@ from dataclasses import dataclass, field
 from statistics import median
 
 import uvloop
-from measuring import BIN, MISSION_XML, percentile, report, summary
+from measuring import MISSION_XML, percentile, report, summary
+from missions import mission_up
 
 from backbone.command_line.watching import Watched, watch
 from backbone.command_line.where import Where
@@ -42,7 +42,8 @@ from ui_console.model.events import CommandApplied, ConsoleEvent
 from ui_console.session.joining import join
 from ui_console.session.teleoperation import Teleoperation
 
-WHERE = Where("iros2001", None, None)
+MISSION = "iros2001"
+WHERE = Where(MISSION, None, None)
 CLAIM = {"robot": "scout3", "kind": "drive", "priority": 100}
 TURN = MoveWish(forward_m_s=0.0, turn_rad_s=0.3)  # chosen: the robot stays where it is
 PERIOD_S = 0.01  # a command loop of 100 Hz
@@ -163,17 +164,8 @@ def main() -> None:
     if given.watcher:
         be_watcher(given.cycles, given.seconds)
         return
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_RUNTIME_DIR"] = folder
-        command = [str(BIN / "scout-backbone"), "up", str(MISSION_XML), "--headless"]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
-            assert launcher.stderr is not None
-            next(line for line in launcher.stderr if line.startswith("all ready"))
-            try:
-                driver = uvloop.run(measure(given))
-            finally:
-                launcher.terminate()
-                launcher.stderr.read()
+    with mission_up(MISSION_XML, name=MISSION):
+        driver = uvloop.run(measure(given))
     kinds = [(kind, driver.times[kind]) for kind in KINDS]
     half, late = ({kind: percentile(times.applied_s, share) for kind, times in kinds} for share in (0.5, 0.99))
     of_parts = {kind: median(times.late_s) for kind, times in kinds}

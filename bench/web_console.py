@@ -10,24 +10,21 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import re
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import psutil
-from console import busy_s, launcher_pid, mission_processes, percent
+from console import busy_s, percent
 from measuring import BIN, MISSION_XML, percentile, report
+from missions import RealMission, mission_up, own_processes
 from websockets.asyncio.client import ClientConnection, connect
 
-from backbone import run_files
 from backbone.bus.clock import MissionClock
 
 ROBOTS = ("scout1", "scout2", "scout3")
@@ -120,10 +117,9 @@ def longest_gap_ms(times_s: list[float]) -> float:
     return round(1000 * max(later - earlier for earlier, later in pairwise(times_s)), 1)
 
 
-async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -> dict[str, Any]:
+async def watch(running: RealMission, port: int, token: str, server: psutil.Process, lasts_s: float) -> dict[str, Any]:
     """Watch all robots for this time; return the measurements."""
-    found = run_files.find()
-    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+    clock = running.clock
     async with connect(f"ws://127.0.0.1:{port}/socket", compression=None, proxy=None) as socket:
         await socket.send(json.dumps({"do": "hello", "token": token, "user": "bench"}))
         watcher = Watcher(socket, clock)
@@ -131,7 +127,7 @@ async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -
         await clock.sleep_s(SETTLE_S)
         await socket.send(json.dumps({"do": "watch", "robots": ROBOTS}))
         await clock.sleep_s(1.0)
-        mission = mission_processes(launcher_pid())
+        mission = own_processes(running)
         watcher.is_counting = True
         began_s, own_s, mission_s = time.monotonic(), busy_s([server]), busy_s(mission)
         await clock.sleep_s(lasts_s)
@@ -159,12 +155,7 @@ async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -
 
 def main(lasts_s: float = 15.0, pictures_per_s: float = 15.0) -> None:
     """Print one JSON line."""
-    with tempfile.TemporaryDirectory(prefix="scout-bench-") as folder:
-        os.environ["XDG_RUNTIME_DIR"] = folder
-        file = Path(folder) / "mission.xml"
-        file.write_text(with_three_frequencies(MISSION_XML.read_text(), pictures_per_s))
-        backbone = str(BIN / "scout-backbone")
-        subprocess.run([backbone, "up", str(file), "--detach", "--headless"], check=True, stderr=subprocess.DEVNULL)
+    with mission_up(with_three_frequencies(MISSION_XML.read_text(), pictures_per_s)) as running:
         serving = subprocess.Popen(
             [str(BIN / "scout-console"), "serve", "--port", "0"], stdout=subprocess.PIPE, text=True
         )
@@ -172,11 +163,11 @@ def main(lasts_s: float = 15.0, pictures_per_s: float = 15.0) -> None:
             assert serving.stdout is not None
             found = re.fullmatch(r"http://[^:]+:(\d+)/#token=(\S+)\n", serving.stdout.readline())
             assert found is not None
-            report("web_console", **asyncio.run(watch(int(found[1]), found[2], psutil.Process(serving.pid), lasts_s)))
+            server = psutil.Process(serving.pid)
+            report("web_console", **asyncio.run(watch(running, int(found[1]), found[2], server, lasts_s)))
         finally:
             serving.terminate()
             serving.wait(10)
-            subprocess.run([backbone, "down"], check=False, capture_output=True)
 
 
 if __name__ == "__main__":
