@@ -3,9 +3,9 @@
 Runs the mission of IROS 2001 with short slices several times: alone, with a recorder of everything, and, as the floor,
 with a process that receives all copies of its host and discards them. Meanwhile it asks the RC manager a question
 twenty times a second. Prints one JSON line; ``core_share`` and ``floor_share`` are parts of one core. Switch times are
-from the RC manager's trace, of all runs together, while no process starts. ``switch_ratio`` and ``question_ratio`` are
-medians with a recorder over those without; ``late`` ones are of the 99th percentiles, ``floor`` ones of the process
-that keeps nothing.
+from the RC manager's trace, of all runs together. All figures are of the time in which no process starts.
+``switch_ratio`` and ``question_ratio`` are medians with a recorder over those without; ``late`` ones are of the 99th
+percentiles, ``floor`` ones of the process that keeps nothing.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from statistics import median, quantiles
 import psutil
 from measuring import BIN, report
 from missions import mission_up
-from switch_time import NAME, fast_mission, measure, switches_s
+from switch_time import NAME, Measured, fast_mission, measure, switches_s
 
 from backbone import run_files
 from backbone.recording.host_ear import HostEar
@@ -51,8 +51,8 @@ class Runs:
         return quantiles(self.questions_s, n=100)[98]
 
 
-def run(mission: str, trace: Path, seconds: float, listener: list[str], runs: Runs) -> float:
-    """Run the mission once, with or without a process that overhears it; return that process's share of a core."""
+def run(mission: str, trace: Path, seconds: float, listener: list[str], runs: Runs) -> tuple[float, Measured]:
+    """Run the mission once, with or without a process that overhears it; return that process's share of a core, too."""
     trace.unlink(missing_ok=True)
     with mission_up(mission, "--trace", str(trace), name=NAME), recorder_of(listener) as recorder:
         time.sleep(SETTLE_S)
@@ -61,7 +61,7 @@ def run(mission: str, trace: Path, seconds: float, listener: list[str], runs: Ru
         share = (busy_s(recorder) - before_s) / seconds
     runs.switches_s += switches_s(trace, measured.since_s, measured.until_s)
     runs.questions_s += measured.questions_s
-    return share
+    return share, measured
 
 
 @contextmanager
@@ -107,22 +107,24 @@ def main() -> None:
         asyncio.run(overhear())
         return
     plain, recorded, emptied = Runs(), Runs(), Runs()
-    shares, floors, messages, size, missing = [], [], 0, 0, 0
+    shares, floors, messages, size, missing = [], [], 0, 0.0, 0
     with tempfile.TemporaryDirectory() as folder:
         mission, trace = fast_mission(settling=False, clean_stop=False), Path(folder) / "trace.jsonl"
         for number in range(given.rounds):
             run(mission, trace, given.seconds, [], plain)
             to = Path(folder) / f"{number}.mcap"
             record = [str(BIN / "scout-backbone"), "record", "--to", str(to)]
-            shares.append(run(mission, trace, given.seconds, record, recorded))
+            share, measured = run(mission, trace, given.seconds, record, recorded)
+            shares.append(share)
             overhears = [sys.executable, __file__, "--overhear"]
-            floors.append(run(mission, trace, given.seconds, overhears, emptied))
+            floors.append(run(mission, trace, given.seconds, overhears, emptied)[0])
             with to.open("rb") as file:
                 recording = Recording(file)
-                messages += recording.contents().messages
-                missing += sum(missing_numbers(recording.messages()).values())
-            size += to.stat().st_size
-    lasted_s = given.rounds * (given.seconds + SETTLE_S)
+                found = [one for one in recording.messages() if measured.since_s <= one.at_s < measured.until_s]
+                size += to.stat().st_size * len(found) / recording.contents().messages
+            messages += len(found)
+            missing += sum(missing_numbers(found).values())
+    lasted_s = given.rounds * given.seconds
     report(
         "recording",
         messages_a_second=round(messages / lasted_s),
