@@ -55,7 +55,8 @@ def measure(name: str, command: Sequence[str], aim_s: float, rounds: int, typed:
         took.append(seconds(command, environment))
     took_s, floor_s = median(took), median(floors)
     report(
-        f"command_line {name}",
+        "command_line",
+        command=name,
         rounds=rounds,
         ms=round(took_s * 1e3, 1),
         best_ms=round(min(took) * 1e3, 1),
