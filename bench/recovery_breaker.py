@@ -12,11 +12,12 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import psutil
-from recovery_mission import MARK, POLL_S, BenchMission, NotSeen, marked, mission_coming_up
+from recovery_mission import POLL_S, BenchMission, NotSeen, mission_coming_up
 from recovery_trace import violations
 from recovery_verdict import Expected, Fault, Judgement, longest_gap_s
 
 from backbone.creator.process_table import is_stopped
+from mission_control.laboratory.module_kit.real_mission import MARK, marked
 
 WATCHERS = frozenset({"watch-scout1-capture", "watch-scout2-capture"})
 HARDWARE = ("radio", "scout1", "scout2", "scout3", "video1")

@@ -24,7 +24,8 @@ from typing import Any
 import psutil
 from measuring import BIN, MISSION_XML
 
-MARK = "SCOUT_BENCH_MARK"
+from mission_control.laboratory.module_kit.real_mission import MARK, marked, wait_gone
+
 CONSOLE_ROBOT = "scout3"
 COMMAND_WITHIN_S = 60.0
 POLL_S = 0.02
@@ -185,10 +186,7 @@ class BenchMission:
 
     def left(self, within_s: float = GONE_WITHIN_S) -> list[psutil.Process]:
         """Return its remaining processes after at most this time."""
-        ends_s = time.monotonic() + within_s
-        while (left := marked(self.environment[MARK])) and time.monotonic() < ends_s:
-            time.sleep(POLL_S)
-        return left
+        return wait_gone(self.environment[MARK], within_s)
 
     def logs(self) -> dict[str, int]:
         """Return the bytes of each log file."""
@@ -216,16 +214,6 @@ class BenchMission:
 def console_arcs(look: Look) -> list[str]:
     """Return the ARCs of a console that hold RCs."""
     return [arc for arc in look.sight.get("held", []) if arc.endswith("-drive")]
-
-
-def marked(mark: str) -> list[psutil.Process]:
-    """Return every process whose environment carries the mark."""
-    found = []
-    for process in psutil.process_iter():
-        with contextlib.suppress(psutil.Error):
-            if process.environ().get(MARK) == mark and process.status() != psutil.STATUS_ZOMBIE:
-                found.append(process)
-    return found
 
 
 @contextlib.contextmanager
