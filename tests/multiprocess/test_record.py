@@ -137,6 +137,7 @@ def test_a_recording_has_all_messages_and_tells_what_the_mission_told(mission: R
 
 
 @pytest.mark.thorough
+@pytest.mark.alone  # half a second is measured on the machine
 @pytest.mark.parametrize(
     "seed", [pytest.param(seed, marks=() if seed < QUICK_KILLS else pytest.mark.slow) for seed in range(KILLS)]
 )
