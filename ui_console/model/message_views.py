@@ -111,6 +111,8 @@ def installed_views() -> Views:
             table = msgspec.convert(entry.load(), dict[str, type])
             if wrong := [schema for schema, kind in table.items() if not isinstance(kind(), MessageView)]:
                 raise TypeError(f"the view of {wrong[0]} is not derived from MessageView")
+            if bare := [schema for schema in table if not schema.partition("/")[2]]:
+                raise ValueError(f"the schema {bare[0]} lacks its version: write {bare[0].rstrip('/')}/1")
             found |= table
         except Exception as error:  # a module that is being written raises anything
             log.warning("the views of %s are left out: %s", entry.name, complaint(error))

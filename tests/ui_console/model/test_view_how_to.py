@@ -56,6 +56,7 @@ def test_the_example_shows_its_message_once_its_package_is_installed(
         "class VIEWS: ...",
         "VIEWS = {'A/1': int}",
         "class Wide:\n    def __init__(self, width): ...\nVIEWS = {'A/1': Wide}",
+        "from ui_console.model.message_views import MessageView\nVIEWS = {'A': MessageView}",
     ],
 )
 def test_a_package_with_a_fault_in_its_views_is_left_out_and_named(
