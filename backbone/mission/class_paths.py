@@ -36,6 +36,13 @@ def class_path_fault(class_path: str) -> tuple[str, list[str]] | None:
     return f"no class {name} in {module}", re.findall(r"^class (\w+)", source, re.MULTILINE)
 
 
+def class_path_remedy(class_path: str, fault: str) -> str:
+    """Return the remedy for a fault that ``class_path_fault`` found."""
+    if fault == f"no module {class_path.partition(':')[0].partition('.')[0]}":
+        return "Correct the name, or put its folder on PYTHONPATH"
+    return "Write the class as package.module:Class"
+
+
 def _find_top(name: str) -> ModuleSpec | None:
     try:
         return find_spec(name)

@@ -10,7 +10,7 @@ import re
 from collections.abc import Collection, Sequence
 
 from backbone.mission.class_facts import PLANNER, ClassFacts, ParameterFacts, Question, parameters_of
-from backbone.mission.class_paths import CLASS_PATH, class_path_fault
+from backbone.mission.class_paths import CLASS_PATH, class_path_fault, class_path_remedy
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
 from backbone.mission.tables import (
@@ -121,7 +121,7 @@ def check_class_path(element: Element, attribute: str, report: Report) -> bool:
     report.fault(
         element.place_of(attribute),
         f"{class_path}: {message}{report.hint(name.rpartition('.')[2], there)}",
-        "Write the class as package.module:Class, importable on this machine",
+        class_path_remedy(class_path, message),
     )
     return False
 

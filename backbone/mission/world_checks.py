@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from backbone.mission.class_paths import CLASS_PATH, class_path_fault
+from backbone.mission.class_paths import CLASS_PATH, class_path_fault, class_path_remedy
 from backbone.mission.document import Element
 from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.report import Report, quoted
@@ -211,7 +211,7 @@ def _check_classes(world: Element, tables: Tables, report: Report) -> None:
             report.fault(
                 robot.place_of("class"),
                 f"{class_path}: {message}{report.hint(class_path.rpartition(':')[2], there)}",
-                BODY,
+                class_path_remedy(class_path, message),
             )
 
 

@@ -89,7 +89,7 @@ def test_the_reference_tells_every_rule_with_its_default_and_meaning() -> None:
     ("planner", "message"),
     [
         ("nonsense", "planner='nonsense' is illegal"),
-        ("no.module:Planner", "no.module:Planner: no module no"),
+        ("no.module:Planner", "no.module:Planner: no module no (Correct the name, or put its folder on PYTHONPATH)"),
         ("backbone.scheduling.rules:SchedulingRules", "is no planner: it lacks before, due"),
         ("backbone.scheduling.whole_group:WholePlanner", "(did you mean 'WholeGroupPlanner'?)"),
     ],
