@@ -88,10 +88,11 @@ def test_the_guides_tests_pass(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_an_example_outside_of_the_tree_is_installed_and_tested_by_the_commands_of_its_readme(tmp_path: Path) -> None:
-    wheels, example = tmp_path / "wheels", tmp_path / "red-ball"
-    done(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(wheels), str(TOP), folder=tmp_path)
+    example = tmp_path / "red-ball"
     shutil.copytree(EXAMPLES / "red-ball", example, ignore=shutil.ignore_patterns(".*", "__pycache__"))
     [commands] = re.findall(r"```bash\n(.*?)```", (example / "README.md").read_text(), re.DOTALL)
     assert len(commands.splitlines()) == 2
-    told = done("bash", "-euo", "pipefail", "-c", commands, folder=example, PIP_FIND_LINKS=str(wheels), PYTHONPATH="")
+    assert (EXAMPLES / "red-ball" / "../../..").resolve() == TOP
+    commands = commands.replace("../../..", str(TOP))  # as the README asks of a copy
+    told = done("bash", "-euo", "pipefail", "-c", commands, folder=example, PYTHONPATH="")
     assert "6 passed" in told
