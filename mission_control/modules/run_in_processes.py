@@ -98,7 +98,7 @@ def run_in_processes(
         frequency_hz: Rounds a second, above 0.
         for_s: Seconds; left out: until the process is interrupted.
         listen: Key → function that is called in this process with each of its values; values over 8 MB reach modules
-            only.
+            only. An exception in it ends the run, and is raised.
 
     Raises:
         GraphRefused: The modules cannot be connected, or exchange values that are not messages; the error lists all
@@ -182,7 +182,7 @@ async def _accompany(
     hub = ZenohBus.open(MISSION, "ui_console/script", clock, hub_config([endpoint]))
     try:
         for child in children:
-            _subscribe(hub, child.launch, listen)
+            _subscribe(hub, child.launch, listen, fell)
             await _begin(hub, child, endpoint, fell)
         try:
             async with asyncio.timeout(for_s if for_s < math.inf else None):
@@ -195,7 +195,7 @@ async def _accompany(
         await hub.close()
 
 
-def _subscribe(hub: ZenohBus, launch: Launch, listen: Mapping[str, Listener]) -> None:
+def _subscribe(hub: ZenohBus, launch: Launch, listen: Mapping[str, Listener], fell: asyncio.Future[str]) -> None:
     """Call the listeners of this unit's outputs."""
     given = msgspec.convert(launch.parameters, UnitParameters)
     for order in given.modules:
@@ -205,11 +205,15 @@ def _subscribe(hub: ZenohBus, launch: Launch, listen: Mapping[str, Listener]) ->
             kind = kinds[port.name]
             if key in listen and is_message(kind):
                 at, listener = output_address(launch.address, key), listen[key]
-                hub.subscribe(at, Conversation.OUTPUTS, kind, partial(_hand_on, listener))
+                hub.subscribe(at, Conversation.OUTPUTS, kind, partial(_hand_on, listener, fell))
 
 
-def _hand_on(listener: Listener, output: Envelope[Message]) -> None:
-    listener(output.body)
+def _hand_on(listener: Listener, fell: asyncio.Future[str], output: Envelope[Message]) -> None:
+    """Call the listener; its exception ends the run, as it does in one process."""
+    try:
+        listener(output.body)
+    except (Exception, SystemExit) as error:
+        settle(fell, error)
 
 
 async def _begin(hub: ZenohBus, child: _Child, endpoint: str, fell: asyncio.Future[str]) -> None:
@@ -218,10 +222,10 @@ async def _begin(hub: ZenohBus, child: _Child, endpoint: str, fell: asyncio.Futu
     hub.watch_alive(child.launch.address, lambda _address, alive: settle(ready, "") if alive else None)
     child.connection.send(endpoint)
     await asyncio.wait({ready, fell}, timeout=READY_WITHIN_S, return_when=asyncio.FIRST_COMPLETED)
+    if fell.done():
+        raise ModuleProcessFell(f"the process of {fell.result()} ended")
     if not ready.done():
-        raise ModuleProcessFell(
-            f"the process of {child.launch.name} {'ended' if fell.done() else 'was not ready in time'}"
-        )
+        raise ModuleProcessFell(f"the process of {child.launch.name} was not ready in time")
 
 
 async def _statistics(hub: ZenohBus, launch: Launch) -> dict[str, float]:
