@@ -21,10 +21,12 @@ def begin(source: str) -> tuple[Draft, DraftFile]:
     """Return the draft of a mission file: earlier unsaved changes, else the file's content, else a new mission.
 
     Raises:
-        NotSaved: The folder of the file does not exist.
+        NotSaved: The file is a folder, or its folder does not exist.
         DraftUnreadable: The draft file is not valid.
         MissionInvalid: The file cannot be read, or is no XML.
     """
+    if Path(source).is_dir():
+        raise NotSaved(f"{source} is a folder", remedy="Name a mission file in it.")
     folder = Path(source).parent
     if not folder.is_dir():
         raise NotSaved(f"{folder} is no folder", remedy="Make it first.")

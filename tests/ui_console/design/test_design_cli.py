@@ -44,6 +44,13 @@ def test_a_folder_that_is_not_there_is_refused_before_anything_is_built(tmp_path
     assert "is no folder" in told
 
 
+@pytest.mark.parametrize("folder", [".", "..", "/", "ui_console"])
+def test_a_folder_in_place_of_a_mission_file_is_refused(folder: str) -> None:
+    code, told = serve(Path(folder))
+    assert code == 5
+    assert "is a folder" in told
+
+
 @pytest.mark.parametrize("more", [["--mission", "iros2001"], ["--connect", "tcp/127.0.0.1:1"]])
 def test_a_mission_that_is_up_is_not_designed(tmp_path: Path, more: list[str]) -> None:
     code, told = serve(tmp_path / "mission.xml", *more)
