@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from backbone.bus.interface import Bus, Clock
 from backbone.command_line.connection import connected
 from backbone.command_line.listening import watching_end
+from backbone.command_line.unusable_file import FileUnusable
 from backbone.command_line.where import Where
 from backbone.debug_views import UnknownView, ViewEntry, ViewKind, ViewPicture, ViewValue
 from backbone.errors import LinkError, Refusal
@@ -74,7 +75,7 @@ async def look_into(where: Where, name: str, view: str, options: LookOptions) ->
         options: How it is shown.
 
     Raises:
-        Refusal: There is no such behavior or view, or the view is not a picture.
+        Refusal: There is no such behavior or view, the view is not a picture, or the file cannot be written.
         LinkError: The behavior did not answer.
     """
     async with connected(where) as (bus, clock):
@@ -210,7 +211,10 @@ async def _save(looked: _Looked, file: Path, for_s: float) -> ExitCode:
             return ended
         when = f"before {looked.farewell}" if looked.farewell else f"within {for_s:g} s"
         raise NothingShown(f"no picture of {looked.entry.view} came {when}")
-    await asyncio.to_thread(file.write_bytes, png(pixels_of(found[0])))
+    try:
+        await asyncio.to_thread(file.write_bytes, png(pixels_of(found[0])))
+    except OSError as error:
+        raise FileUnusable(f"{file} cannot be written: {error.strerror or error}") from error
     say(f"{file}: {looked.entry.view} at {found[0].at_s:.2f} s")
     return ExitCode.DONE
 
