@@ -37,7 +37,7 @@ class NoViews(Refusal):
     """The component is not a behavior, so it has no debug views."""
 
     code = "views.no_behavior"
-    remedy = "Name a behavior; 'scout-backbone components' lists all behaviors."
+    remedy = "Name a behavior; 'scout-backbone tree' shows the behaviors of the mission file."
 
 
 async def find_behavior(bus: Bus, name: str) -> str:
