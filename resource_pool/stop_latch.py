@@ -14,9 +14,10 @@ from __future__ import annotations
 import msgspec
 
 from backbone.component.messages import StandingStop
+from backbone.ranges import MOST_FEW
 from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
 
-MOST_AUTHORS = 16  # chosen: more people than operate one robot
+MOST_AUTHORS = MOST_FEW  # as many as a ``StopState`` carries beside the first one
 
 
 class StopLatch:
@@ -41,8 +42,8 @@ class StopLatch:
         if not state.is_stopped:
             self.state = StopState(state.rc, True, state.number + 1, by, reason, now_s, console=console)
             return True
-        is_new = author not in (Stopper(state.by, state.console), *state.also) and len(state.also) < MOST_AUTHORS
-        also = [*state.also, author] if is_new else state.also
+        is_new = author not in (Stopper(state.by, state.console), *state.also)
+        also = _fitting([*state.also, author]) if is_new else state.also
         self.state = msgspec.structs.replace(state, number=state.number + 1, also=also)
         return is_new
 
@@ -106,3 +107,15 @@ class StopLatch:
             reason=state.reason,
             since_s=state.at_s,
         )
+
+
+def _fitting(also: list[Stopper]) -> list[Stopper]:
+    """Return at most ``MOST_AUTHORS`` of these authors; a person's earlier consoles go first, the newest author last.
+
+    A program that stops a robot by one console after the other thus leaves room for other people.
+    """
+    if len(also) <= MOST_AUTHORS:
+        return also
+    later = [author.by for author in also]
+    double = next((at for at, author in enumerate(also) if author.by in later[at + 1 :]), len(also) - 1)
+    return also[:double] + also[double + 1 :]

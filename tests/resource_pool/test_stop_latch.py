@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from resource_pool.arc_client import EmergencyStopped, StopState
 from resource_pool.stop_knowledge import StopKnowledge
-from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_latch import MOST_AUTHORS, StopLatch
 from resource_pool.stop_messages import GivenBeforeStop, OtherStop, Stopper
 
 
@@ -46,6 +46,25 @@ def test_all_who_stop_a_robot_are_named_once_until_it_may_move_again() -> None:
     latch.lift(latch.state.number, "ben", 3.0)
     latch.stop("cleo", "", 4.0)
     assert (latch.state.by, latch.state.also) == ("cleo", [])
+
+
+def test_an_operator_who_stops_a_robot_after_forty_others_is_an_author_too() -> None:
+    latch = StopLatch("scout1")
+    for number in range(41):
+        assert latch.stop(f"operator{number}", "", 1.0, f"ui_console/console-{number}")
+    assert latch.state.also[-1] == Stopper("operator40", "ui_console/console-40")
+
+
+def test_a_person_who_stops_a_robot_by_ever_new_consoles_leaves_room_for_another_author() -> None:
+    latch = StopLatch("scout1")
+    for number in range(MOST_AUTHORS + 9):
+        assert latch.stop("anna", "", 1.0, f"ui_console/console-{number}")
+    assert latch.stop("ben", "", 2.0, "ui_console/b")
+    assert len(latch.state.also) == MOST_AUTHORS
+    assert latch.state.also[-2:] == [
+        Stopper("anna", f"ui_console/console-{MOST_AUTHORS + 8}"),
+        Stopper("ben", "ui_console/b"),
+    ]
 
 
 def test_a_lift_of_what_was_seen_before_somebody_else_stopped_too_lifts_nothing() -> None:
