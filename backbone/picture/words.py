@@ -9,8 +9,8 @@ from backbone.scheduling.views import RequestView
 WANTED = "self"
 """The reason for a robot that the console itself gave back."""
 
-UNDECIDED = ("lost", "lease", "silent")
-"""The reasons for losses without a decision: the console was cut off, or paused."""
+UNDECIDED = ("lost", "lease", "silent", "rc")
+"""The reasons for losses without a decision: the console was cut off or paused, or an RC does not answer."""
 
 _SENTENCES = {
     "slice": "it is the turn of {by}",

@@ -344,7 +344,7 @@ class ConsoleModel:
     def _take_loss(self, lost: Suspended, at_s: float) -> None:
         self.held, self.lost = None, lost
         if lost.reason in UNDECIDED:
-            self._went = views.LostView(self.robot, "the link to it was away for too long", at_s, False)
+            self._went = views.LostView(self.robot, self._why_lost(lost), at_s, False)
         self._pictures.clear()
         if lost.reason != WANTED:
             line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(lost)}"

@@ -37,11 +37,17 @@ def test_a_robot_given_back_on_purpose_is_not_lost() -> None:
     assert model(ASK, GRANT, GivenBack(20.0, "released", True)).own(21.0).lost is None
 
 
-def test_a_robot_lost_with_its_link_is_said_to_be_lost_while_the_console_asks_for_it_again() -> None:
-    shown = model(Heard(8.0, SCHEDULE), ASK, GRANT, Heard(12.0, Suspended("arc", "lease", "", -1.0)))
+@pytest.mark.parametrize(
+    ("reason", "why"),
+    [("lease", "the RC manager was silent for too long"), ("rc", "scout1 does not answer")],
+)
+def test_a_robot_lost_without_a_decision_is_said_to_be_lost_while_the_console_asks_for_it_again(
+    reason: str, why: str
+) -> None:
+    shown = model(Heard(8.0, SCHEDULE), ASK, GRANT, Heard(12.0, Suspended("arc", reason, "scout1", -1.0)))
     lost = shown.own(12.0).lost
     assert lost is not None
-    assert (lost.robot, lost.at_s, lost.may_retake) == ("scout1", 12.0, False)
+    assert (lost.robot, lost.at_s, lost.may_retake, lost.why) == ("scout1", 12.0, False, why)
     shown.apply(Granted(14.0, "scout1", GRANT.rcs, {"scout1": 8}, 20.0, 9.95, True))
     assert shown.own(14.0).lost is None
 

@@ -50,6 +50,7 @@ def test_after_a_loss_that_nobody_decided_a_script_moves_nothing_before_a_halt()
         ("lost", True),
         ("lease", True),
         ("silent", True),
+        ("rc", True),
         ("slice", False),
         ("higher", False),
     ):
