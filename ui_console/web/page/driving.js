@@ -118,6 +118,10 @@ export class Driving {
   /** @param {PointerEvent} event */
   drag(event) {
     if (event.pointerId !== this.pointer) return;
+    if (event.pointerType === "mouse" && event.buttons !== 1) {
+      this.drop(event); // browsers report the release of one mouse button only when all are up, and none to a menu
+      return;
+    }
     const box = this.pad.getBoundingClientRect();
     let right = (2 * (event.clientX - box.left)) / box.width - 1;
     let forward = 1 - (2 * (event.clientY - box.top)) / box.height;
@@ -214,6 +218,7 @@ export class Gamepad {
     this.isSpent = true; // a shoulder button held from the beginning was not pressed for this page
     /** @type {string[] | null} */
     this.pressed = null;
+    this.index = 0;
   }
 
   /** Ignore held buttons. */
@@ -225,14 +230,15 @@ export class Gamepad {
   /**
    * Process its state; undefined: it is disconnected, or another window uses it.
    *
-   * @param {{ buttons: readonly { pressed: boolean }[], axes: readonly number[] } | undefined} device
+   * @param {{ index: number, buttons: readonly { pressed: boolean }[], axes: readonly number[] } | undefined} device
    */
   feel(device) {
-    if (device === undefined) {
-      this.spend();
+    if (device === undefined || device.index !== this.index) {
+      this.spend(); // nothing held on another gamepad was pressed for this page
       this.pressed = null;
-      return;
     }
+    if (device === undefined) return;
+    this.index = device.index;
     const isDown = (/** @type {number} */ number) => device.buttons[number]?.pressed ?? false;
     const before = this.pressed;
     this.pressed = Object.keys(BUTTONS).filter((number) => isDown(Number(number)));

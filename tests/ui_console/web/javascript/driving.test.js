@@ -7,8 +7,8 @@ import { Gamepad } from "../../../../ui_console/web/page/driving.js";
 
 const SHOULDER = 5;
 
-function device(held, axes = [0.5, -1, 0, 0]) {
-  return { axes, buttons: Array.from({ length: 16 }, (_none, number) => ({ pressed: held.includes(number) })) };
+function device(held, axes = [0.5, -1, 0, 0], index = 0) {
+  return { index, axes, buttons: Array.from({ length: 16 }, (_none, number) => ({ pressed: held.includes(number) })) };
 }
 
 test("the stick alone does nothing, with the shoulder button it drives", () => {
@@ -48,4 +48,17 @@ test("a button acts once for each press, and not when it was held while the wind
   pad.feel(undefined);
   pad.feel(device([1]));
   assert.deepEqual(did, ["stop_all"]);
+});
+
+test("when a gamepad is unplugged, what is held on another one has to be let go and pressed anew", () => {
+  const did = [];
+  const pad = new Gamepad((what) => did.push(what));
+  pad.feel(device([]));
+  pad.feel(device([SHOULDER]));
+  pad.feel(device([SHOULDER, 9], undefined, 1));
+  assert.equal(pad.stick, null);
+  assert.deepEqual(did, []);
+  pad.feel(device([], undefined, 1));
+  pad.feel(device([SHOULDER], undefined, 1));
+  assert.notEqual(pad.stick, null);
 });

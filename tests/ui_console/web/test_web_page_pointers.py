@@ -1,0 +1,30 @@
+"""The drag pad in a real browser: which button of a mouse drives."""
+
+from __future__ import annotations
+
+import pytest
+from web_page import Mouse, Wheels, page_at, take
+from web_stage import Stage
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
+
+
+@pytest.mark.parametrize("other", ["right", "middle"])
+async def test_a_second_mouse_button_halts_and_neither_button_drives_before_a_new_press(
+    stage: Stage, other: str
+) -> None:
+    """A browser reports the release of one button only when all are up."""
+    async with page_at(stage) as page:
+        await take(page)
+        wheels, mouse = Wheels(stage), Mouse(page)
+        await mouse.hold()
+        await wheels.wait_turning()
+        await page.mouse.down(button=other)
+        await wheels.wait_halted()
+        await mouse.let_go()
+        await wheels.assert_still("only the other button is down")
+        await page.mouse.up(button=other)
+        await mouse.hold()
+        await wheels.wait_turning()
+        await mouse.let_go()
+        await wheels.wait_halted()
