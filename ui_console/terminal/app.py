@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import TypeVar
@@ -157,8 +158,10 @@ class ConsoleApp(ConsoleDisplay):
 
     def action_decide(self, is_given: bool) -> None:
         """Answer the question on the screen, if there is one; a later question is answered by a later press."""
-        if self._view is not None and self._view.own.consent is not None:
-            self._session.decide(is_given, self._view.own.consent.number)
+        consent = self._view.own.consent if self._view is not None else None
+        number = consent.number if consent is not None else 0
+        if self._answering.press(number, asyncio.get_running_loop().time()):
+            self._session.decide(is_given, number)
 
     def on_app_blur(self, _event: AppBlur) -> None:
         """Stop the wheels when the window loses the focus, because it gets no key events after that."""

@@ -18,6 +18,7 @@ from textual.events import CursorPosition, Resize, Unmount
 from textual.screen import Screen
 from textual.widgets import Static
 
+from ui_console.model.answering import AnswerGrip
 from ui_console.model.driving import SPEED
 from ui_console.model.profile import Profile
 from ui_console.model.views import ConsoleView
@@ -111,6 +112,7 @@ class ConsoleDisplay(EndingApp):
         self._found: LogResult | None = None
         self._view: ConsoleView | None = None
         self._stops: set[asyncio.Task[None]] = set()
+        self._answering = AnswerGrip()
 
     @property
     def drives(self) -> bool:

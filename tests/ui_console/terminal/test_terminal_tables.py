@@ -180,6 +180,22 @@ async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_key
         assert "asks" not in screen_text(screen)
 
 
+async def test_a_key_that_is_held_answers_one_question_and_not_the_next() -> None:
+    shown = held_model()
+    asked = [Sought(f"ui_console/console-{n}", "ben", f"scout{n}", "", 18.0, Topic.LIFT, number=n) for n in (1, 2)]
+    for sought in asked:
+        shown.apply(sought)
+    session = WrittenSession(shown=shown)
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=(160, 36)) as pilot:
+        await settle(pilot)
+        await pilot.press("g")
+        shown.apply(Settled(asked[0], Consent(True, "anna", "")))
+        screen.redraw()
+        await pilot.press(*"gggg")
+    assert session.wanted == [("decide", True, 1)]
+
+
 async def test_a_pendants_holder_is_asked_in_the_same_words_and_answers_by_the_same_keys() -> None:
     shown = held_model()
     shown.apply(Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0, number=1))
