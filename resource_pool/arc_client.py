@@ -14,6 +14,7 @@ import msgspec
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.messages import Stopper
 from backbone.errors import LinkError, Refusal, ReplyTimeout
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -63,7 +64,7 @@ from resource_pool.messages import (
 from resource_pool.rc_readings import ask_readings, watch_readings
 from resource_pool.robot_stops import ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.stop_knowledge import StopKnowledge
-from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
+from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, StopState
 
 __all__ = [
     "DEFAULT_DRIVE_USAGE",

@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import msgspec
 
-from backbone.component.messages import StandingStop
+from backbone.component.messages import StandingStop, Stopper
 from backbone.ranges import MOST_FEW
-from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
+from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, StopState
 
-MOST_AUTHORS = MOST_FEW  # as many as a ``StopState`` carries beside the first one
+MOST_AUTHORS = MOST_FEW - 1  # beside the first one, as many as a ``StandingStop`` carries
 
 
 class StopLatch:
@@ -51,10 +51,20 @@ class StopLatch:
         """Put a stop of the RC's former process in force; return False if a later order is known here."""
         if stop.number <= self.state.number:
             return False
+        (first, *also), rc = stop.authors or [Stopper(stop.by)], self.state.rc
         self.state = StopState(
-            self.state.rc, True, stop.number, stop.by, stop.reason, stop.since_s, is_confirmed=stop.is_confirmed
+            rc, True, stop.number, first.by, stop.reason, stop.since_s, stop.is_confirmed, first.console, also
         )
         return True
+
+    def standing(self) -> StandingStop | None:
+        """Return the stop in force with all its authors, for the RC's next process; None: there is none."""
+        state = self.state
+        if not state.is_stopped:
+            return None
+        authors = [Stopper(state.by, state.console), *state.also]
+        by = ", ".join(dict.fromkeys(author.by for author in authors))
+        return StandingStop(state.number, by, state.reason, state.at_s, state.is_confirmed, authors)
 
     def confirm(self, is_confirmed: bool) -> None:
         """If the robot is still stopped, record whether the radio accepted the packet that stops the wheels."""

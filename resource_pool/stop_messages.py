@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from backbone.component.messages import Stopper
 from backbone.errors import Refusal
 from backbone.ranges import (
     FEW,
@@ -45,18 +46,6 @@ class LiftStop(Message, frozen=True):
 
 class AskStop(Message, frozen=True):
     """Ask whether this robot is stopped."""
-
-
-class Stopper(Message, frozen=True):
-    """An operator who stopped a robot.
-
-    Attributes:
-        by: Name of the operator, for people; without a name the address of the console.
-        console: Address of the operator's console, which is asked before the stop is lifted. Empty: unknown.
-    """
-
-    by: Mention
-    console: Mention = ""
 
 
 class StopState(Message, frozen=True):

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from backbone.component.log_level import LogLevel as LogLevel  # noqa: PLC0414  a part of these messages
 from backbone.errors import Refusal
-from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
+from backbone.ranges import FEW, MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
 MESSAGES_DROPPED, DEADLINES_MISSED = "dropped ", "deadlines missed "
@@ -49,15 +49,28 @@ class Absence(Message, frozen=True):
     is_running: bool = False
 
 
+class Stopper(Message, frozen=True):
+    """An operator who stopped a robot.
+
+    Attributes:
+        by: Name of the operator, for people; without a name the address of the console.
+        console: Address of the operator's console, which is asked before the stop is lifted. Empty: unknown.
+    """
+
+    by: Mention
+    console: Mention = ""
+
+
 class StandingStop(Message, frozen=True):
     """An emergency stop in force: the component moves nothing until an operator lifts the stop.
 
     Attributes:
         number: Grows with each stop; an order to lift names it.
-        by: The operator who stopped the component.
-        reason: The operator's reason; may be empty.
+        by: The operators who stopped the component.
+        reason: The first operator's reason; may be empty.
         since_s: Mission time of the stop.
         is_confirmed: False if the hardware did not confirm standstill.
+        authors: The operators in ``by``, the first of them first; empty: unknown.
     """
 
     number: Count
@@ -65,6 +78,7 @@ class StandingStop(Message, frozen=True):
     reason: Text
     since_s: Instant
     is_confirmed: bool = True
+    authors: Annotated[list[Stopper], FEW] = []
 
 
 class ComponentState(Message, frozen=True, tag="ComponentState/2"):

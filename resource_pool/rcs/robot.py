@@ -289,11 +289,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     def standing_stop(self) -> StandingStop | None:
         """Return the stop in force, for the published state."""
-        state = self._latch.state
-        if not state.is_stopped:
-            return None
-        by = ", ".join(dict.fromkeys([state.by, *(author.by for author in state.also)]))
-        return StandingStop(state.number, by, state.reason, state.at_s, state.is_confirmed)
+        return self._latch.standing()
 
     def _tell_stop(self, state: StopState, what: str) -> None:
         self._publish_stop()

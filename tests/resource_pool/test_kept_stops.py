@@ -71,7 +71,7 @@ def test_a_stop_stays_in_force_on_another_host(local_mission: Any, beside: Any, 
                 await pool.clock.sleep_s(0.1)
             async with beside(scout(there)):
                 state = await ask_stop(operator, "scout1")
-                assert (state.is_stopped, state.number, state.by) == (True, stop.number, "ben, anna")
+                assert state == stop, "with both authors and their consoles"
                 await lift_stop(operator, state)
                 await pool.clock.sleep_s(0.1)
             async with beside(scout(scout_launch(tmp_path / "c"))):

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from resource_pool.arc_client import EmergencyStopped, StopState
+from resource_pool.arc_client import EmergencyStopped, Stopper, StopState
 from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import MOST_AUTHORS, StopLatch
-from resource_pool.stop_messages import GivenBeforeStop, OtherStop, Stopper
+from resource_pool.stop_messages import GivenBeforeStop, OtherStop
 
 
 # ---------------------------------------------------------------------- the latch
@@ -65,6 +65,17 @@ def test_a_person_who_stops_a_robot_by_ever_new_consoles_leaves_room_for_another
         Stopper("anna", f"ui_console/console-{MOST_AUTHORS + 8}"),
         Stopper("ben", "ui_console/b"),
     ]
+
+
+def test_an_rc_on_another_host_knows_every_author_of_the_stop_that_it_resumes() -> None:
+    latch, elsewhere = StopLatch("scout1"), StopLatch("scout1")
+    latch.stop("anna", "fire", 1.0, "ui_console/a")
+    latch.stop("ben", "", 2.0, "ui_console/b")
+    standing = latch.standing()
+    assert standing is not None
+    assert standing.by == "anna, ben"
+    assert elsewhere.resume(standing)
+    assert elsewhere.state == latch.state
 
 
 def test_a_lift_of_what_was_seen_before_somebody_else_stopped_too_lifts_nothing() -> None:

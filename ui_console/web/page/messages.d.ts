@@ -473,6 +473,7 @@ export interface StandingStop {
   reason: string;
   since_s: number;
   is_confirmed: boolean;
+  authors: Stopper[];
 }
 
 export interface StopView {
@@ -484,6 +485,11 @@ export interface StopView {
   also: string[];
   is_mine: boolean;
   lift_line: string;
+}
+
+export interface Stopper {
+  by: string;
+  console: string;
 }
 
 export interface TimelineRow {
