@@ -82,7 +82,8 @@ export class Keys {
       "keydown",
       (event) => {
         const target = /** @type {HTMLElement} */ (event.target);
-        const hasModifier = event.ctrlKey || event.metaKey || event.altKey;
+        const hasAlt = event.altKey && !(event.key in STOPS); // Alt leaves the stops, as in terminals
+        const hasModifier = event.ctrlKey || event.metaKey || hasAlt;
         if (event.altKey && isText(target) && event.code === "KeyX") {
           write(event);
           return;
