@@ -48,7 +48,7 @@ from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recording, missing_numbers, open_file
 from backbone.recording.recorder import Recorder
 from backbone.recording.recovering import recover_file
-from backbone.recording.revival import revived
+from backbone.recording.revival import Reviver
 from backbone.spoken import counted
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
@@ -321,17 +321,20 @@ async def print_events(path: Path, name: str, since_s: float, until_s: float | N
     """Print all events about a name, as the live mission would print those that it keeps."""
     with opened(path) as recording:
         most = recording.contents().messages
-        log = MissionLog(kept=most)
+        log, reviver = MissionLog(kept=most), Reviver()
         for message in recording.messages((f"*/{Conversation.LOG}", f"*/{Conversation.OPERATORS}")):
-            if message.schema == "StoryEvent/1":
-                log.add(revived(StoryEvent, message.body))
-            elif message.schema == "OperatorActed/1":
-                log.add(revived(OperatorActed, message.body).event(message.source, message.cause))
+            match reviver.revived(message, StoryEvent, OperatorActed):
+                case StoryEvent() as event:
+                    log.add(event)
+                case OperatorActed() as act:
+                    log.add(act.event(message.source, message.cause))
     asked = AskLog(since_s, FOR_EVER_S if until_s is None else until_s, name, most=most)
     events = printable_all(log.answer(asked)).events
     show([json.dumps(event_json(event)) for event in events] if as_json else story_lines(events))
     if not events:
         say(f"no event about {name}" if name else "no event")
+    if reviver.unread:
+        say(f"incomplete: {counted(reviver.unread, 'message')} of another form cannot be read")
     return ExitCode.DONE
 
 

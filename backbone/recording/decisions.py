@@ -19,7 +19,7 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import Decided, ScheduleSnapshot, TraceLine
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.revival import revived
+from backbone.recording.revival import Reviver, revived
 from backbone.scheduling import snapshot
 from backbone.scheduling.events import Event, Instruction, Record, Woken
 from backbone.scheduling.own_planner import load_planner
@@ -49,23 +49,21 @@ class RecordedSchedule:
     Attributes:
         manager: A schedule manager in the recorded state; None: not known.
         lacks: Reason why the state is not known.
+        unread: Number of snapshots of another release.
     """
 
     def __init__(self) -> None:
         self.manager: ScheduleManager | None = None
         self.lacks = "the recording has no state of the schedule"
+        self.unread = 0
         self._number = 0
 
     def take(self, told: Decided | ScheduleSnapshot) -> None:
-        """Apply the next event, or take over the state of a snapshot.
-
-        Raises:
-            NoSnapshot: The snapshot is of another release.
-        """
+        """Apply the next event, or take over the state of a snapshot; after one of another release it is not known."""
         match told:
             case ScheduleSnapshot():
                 if self.manager is None or told.number != self._number:
-                    self.manager, self._number = snapshot.read(told.state), told.number
+                    self._take_over(told)
             case Decided() if self.manager is not None and told.number == self._number + 1:
                 self._number += 1
                 self.manager.handle(told.event, told.at_s)
@@ -73,19 +71,29 @@ class RecordedSchedule:
                 self.manager = None
                 self.lacks = f"decisions are missing in the recording before {told.at_s:.3f} s"
 
+    def _take_over(self, told: ScheduleSnapshot) -> None:
+        try:
+            self.manager, self._number = snapshot.read(told.state), told.number
+        except snapshot.NoSnapshot as error:
+            self.manager, self.lacks = None, error.detail
+            self.unread += 1
 
-def schedule_at(recording: Recording, at_s: float) -> ScheduleManager:
+
+def schedule_at(recording: Recording, at_s: float, reviver: Reviver | None = None) -> ScheduleManager:
     """Return a schedule manager in the state that the recorded one had at this mission time.
+
+    Args:
+        reviver: Counts the messages of another release, which are left out; None: they are not counted.
 
     Raises:
         NotRecorded: The recording has no earlier snapshot, or a decision after the snapshot is missing.
-        NoSnapshot, OtherForm: The recording is of another release.
     """
-    schedule = RecordedSchedule()
+    schedule, reviver = RecordedSchedule(), reviver or Reviver()
     for message in _in_order(recording.messages(_DECISIONS, 0.0, at_s, RC_MANAGER)):
-        told = _told(message)
-        if isinstance(told, Decided | ScheduleSnapshot):
-            schedule.take(told)
+        match reviver.revived(message, Decided, ScheduleSnapshot):
+            case Decided() | ScheduleSnapshot() as told:
+                schedule.take(told)
+    reviver.unread += schedule.unread
     if schedule.manager is None:
         raise NotRecorded(f"{schedule.lacks}, asked for {at_s:.3f} s")
     return schedule.manager

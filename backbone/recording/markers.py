@@ -12,8 +12,7 @@ from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed
 from backbone.rc_manager.messages import TraceLine
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.revival import revived
-from backbone.wire import schema_of
+from backbone.recording.revival import Reviver
 
 PARTS = 500  # chosen: a line across a page cannot show more instants
 _SAID = tuple(f"*/{said}" for said in (Conversation.EVENTS, Conversation.LOG, Conversation.OPERATORS))
@@ -46,9 +45,10 @@ class Marker(msgspec.Struct, frozen=True):
 def markers_in(recording: Recording) -> list[Marker]:
     """Return the grants, alarms and actions of people in the order of time, at most ``PARTS`` of each kind.
 
+    Messages of another form than in this release have no marker.
+
     Raises:
         NoRecording: The recording is damaged.
-        OtherForm: The recording is of another release.
     """
     found = recording.contents()
     return spread(_markers(recording.messages(_SAID)), found.begin_s, found.end_s)
@@ -66,15 +66,14 @@ def spread(markers: Iterable[Marker], begin_s: float, end_s: float) -> list[Mark
 
 def _markers(messages: Iterable[Recorded]) -> Iterator[Marker]:
     reasons: dict[str, str] = {}
+    reviver = Reviver()
     for message in messages:
-        if message.schema == schema_of(TraceLine):
-            yield from _switch(message.at_s, revived(TraceLine, message.body), reasons)
-        elif message.schema == schema_of(OperatorActed):
-            act = revived(OperatorActed, message.body)
-            yield Marker(message.at_s, MarkerKind.OPERATOR, act.subject, f"{act.subject}: {act.sentence}")
-        elif message.schema == schema_of(StoryEvent):
-            event = revived(StoryEvent, message.body)
-            if event.level is LogLevel.ALARM:
+        match reviver.revived(message, TraceLine, OperatorActed, StoryEvent):
+            case TraceLine() as told:
+                yield from _switch(message.at_s, told, reasons)
+            case OperatorActed() as act:
+                yield Marker(message.at_s, MarkerKind.OPERATOR, act.subject, f"{act.subject}: {act.sentence}")
+            case StoryEvent(level=LogLevel.ALARM) as event:
                 yield Marker(message.at_s, MarkerKind.ALARM, event.subject, f"{event.subject}: {event.what}")
 
 

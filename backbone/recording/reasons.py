@@ -14,11 +14,11 @@ from backbone.printable import printable_all
 from backbone.recording.decisions import NotRecorded, schedule_at
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
-from backbone.recording.revival import revived
+from backbone.recording.revival import Reviver
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.requests import UnknownRequest
 from backbone.scheduling.views import Why
-from backbone.wire import schema_of
+from backbone.spoken import counted
 
 _SAID = tuple(f"*/{said}" for said in (Conversation.STATUS, Conversation.HEALTH, Conversation.ASK, Conversation.ALIVE))
 
@@ -29,14 +29,13 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
     Raises:
         UnknownName: The recording contains nothing about this name before that time.
         NotRecorded: Only the schedule has this name, and the recording has no earlier state of the schedule.
-        NoSnapshot, OtherForm: The recording is of another release.
     """
-    name = AskedName.of(text).name
-    said = _last_said(recording, at_s)
+    name, reviver = AskedName.of(text).name, Reviver()
+    said = _last_said(recording, at_s, reviver)
     component = said.states.get(name)
     absence = next((one for one in said.absent if one.name == name), None)
     try:
-        why = _why(recording, name, at_s)
+        why = _why(recording, name, at_s, reviver)
     except NotRecorded:
         if component is None and absence is None:
             raise
@@ -44,17 +43,18 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
     if why is None and component is None and absence is None:
         hint = did_you_mean(name, said.states)
         raise UnknownName(f"the recording has nothing about {name!r} before {at_s:.3f} s{hint}", name=name)
+    unread = reviver.unread
+    remarks = [f"incomplete: {counted(unread, 'message')} of another form cannot be read"] if unread else []
     if component is None or name not in said.left_s:
-        return printable_all(Reasons(name, why, None, component, absence))
+        return printable_all(Reasons(name, why, None, component, absence, remarks=remarks))
     doing = f": {component.feedback}" if component.feedback else ""
     before = f"before, it was {component.state} on {component.host}{doing}"
-    return printable_all(
-        Reasons(name, why, None, None, absence, remarks=[f"{name} left the bus at {said.left_s[name]:.3f} s; {before}"])
-    )
+    left = f"{name} left the bus at {said.left_s[name]:.3f} s; {before}"
+    return printable_all(Reasons(name, why, None, None, absence, remarks=[left, *remarks]))
 
 
-def _why(recording: Recording, name: str, at_s: float) -> Why | None:
-    answers = Answers(schedule_at(recording, at_s))
+def _why(recording: Recording, name: str, at_s: float, reviver: Reviver) -> Why | None:
+    answers = Answers(schedule_at(recording, at_s, reviver))
     try:
         return answers.why(name, at_s)
     except UnknownRequest:
@@ -76,17 +76,17 @@ class _LastSaid:
     absent: list[Absence] = field(default_factory=list)
 
 
-def _last_said(recording: Recording, at_s: float) -> _LastSaid:
+def _last_said(recording: Recording, at_s: float, reviver: Reviver) -> _LastSaid:
     said = _LastSaid()
     for message in recording.messages(_SAID, 0.0, at_s):
-        if message.schema == schema_of(ComponentState):
-            state = revived(ComponentState, message.body)
-            said.states[component_of(state.address)] = state
-        elif message.schema == schema_of(MissionHealth):
-            said.absent = revived(MissionHealth, message.body).absent
-        elif message.schema == schema_of(Presence):
-            name = component_of(address_of(message.key))
-            said.left_s.pop(name, None)
-            if not revived(Presence, message.body).alive:
-                said.left_s[name] = message.at_s
+        match reviver.revived(message, ComponentState, MissionHealth, Presence):
+            case ComponentState() as state:
+                said.states[component_of(state.address)] = state
+            case MissionHealth(absent=absent):
+                said.absent = absent
+            case Presence(alive=alive):
+                name = component_of(address_of(message.key))
+                said.left_s.pop(name, None)
+                if not alive:
+                    said.left_s[name] = message.at_s
     return said

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import msgspec
@@ -40,6 +40,31 @@ def revived(kind: type[Kind], body: dict[str, Any] | list[Any]) -> Kind:
         return msgspec.json.decode(msgspec.json.encode(listed), type=kind)
     except (msgspec.DecodeError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise OtherForm(f"{schema_of(kind)}: {error}") from error
+
+
+@dataclass(slots=True)
+class Reviver:
+    """Restores messages one after the other; those of another form are counted instead.
+
+    Attributes:
+        unread: Number of messages that have the name of an asked class, and another form or version than it.
+    """
+
+    unread: int = 0
+
+    def revived(self, message: Recorded, *kinds: type[Kind]) -> Kind | None:
+        """Return the message, if it is of one of these classes and has its form in this release."""
+        name = message.schema.partition("/")[0]
+        kind = next((one for one in kinds if schema_of(one).partition("/")[0] == name), None)
+        if kind is None:
+            return None
+        try:
+            if message.schema == schema_of(kind):
+                return revived(kind, message.body)
+        except OtherForm:
+            pass
+        self.unread += 1
+        return None
 
 
 def message_as_sent(classes: Mapping[str, type[Message]], message: Recorded) -> Message | None:

@@ -97,7 +97,6 @@ class RecordedPlay(Generic[Console]):
 
     Raises:
         NoRecording: The file is not a recording, or its recorder was killed.
-        OtherForm: The recording was made by another release.
     """
 
     def __init__(
