@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
+from backbone.addresses import NAMESERVER
 from backbone.component.messages import Absence, ComponentState
 from backbone.keys import Conversation, address_of
 from backbone.nameserver.messages import UnknownName
@@ -20,6 +22,9 @@ from backbone.scheduling.requests import UnknownRequest
 from backbone.scheduling.views import Why
 from backbone.spoken import counted
 
+TOGETHER_S = (
+    0.5  # chosen: when the hub goes, all tokens fall within 10 ms (measured), and so they rise; mission seconds
+)
 _SAID = tuple(f"*/{said}" for said in (Conversation.STATUS, Conversation.HEALTH, Conversation.ASK, Conversation.ALIVE))
 
 
@@ -49,7 +54,10 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
         return printable_all(Reasons(name, why, None, component, absence, remarks=remarks))
     doing = f": {component.feedback}" if component.feedback else ""
     before = f"before, it was {component.state} on {component.host}{doing}"
-    left = f"{name} left the bus at {said.left_s[name]:.3f} s; {before}"
+    left_s, hub_left_s = said.left_s[name], _hub_left_s(recording, said.left_s[name], at_s, reviver)
+    left = f"{name} left the bus at {left_s:.3f} s; {before}"
+    if hub_left_s is not None:  # a restarted hub is back in a moment, and no component has ended
+        left = f"the hub left the bus at {hub_left_s:.3f} s, and all components with it; {before}"
     return printable_all(Reasons(name, why, None, None, absence, remarks=[left, *remarks]))
 
 
@@ -74,6 +82,18 @@ class _LastSaid:
     states: dict[str, ComponentState] = field(default_factory=dict)
     left_s: dict[str, float] = field(default_factory=dict)
     absent: list[Absence] = field(default_factory=list)
+
+
+def _hub_left_s(recording: Recording, left_s: float, at_s: float, reviver: Reviver) -> float | None:
+    """Return when the hub left, if a token that had fallen fell with the hub's, and the hub's was not up again."""
+    fell_s, rose_s = math.inf, -math.inf
+    for message in recording.messages((f"{NAMESERVER}/{Conversation.ALIVE}",), 0.0, at_s + TOGETHER_S):
+        match reviver.revived(message, Presence):
+            case Presence(alive=True):
+                rose_s = message.at_s
+            case Presence():
+                fell_s, rose_s = message.at_s, math.inf
+    return fell_s if left_s >= fell_s - TOGETHER_S and at_s <= rose_s + TOGETHER_S else None
 
 
 def _last_said(recording: Recording, at_s: float, reviver: Reviver) -> _LastSaid:
