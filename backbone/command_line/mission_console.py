@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
+import stat
 import sys
 from typing import IO, cast
 
@@ -53,7 +55,7 @@ class ConsoleObserver:
         console: The terminal.
         live: True: a picture that is redrawn; False: lines.
         verdict: Pipe to the command that waits until all is ready; None: no command waits.
-        output: Of the terminal, if it is one.
+        output: Of the terminal or pipe, if it is one.
     """
 
     def __init__(
@@ -206,7 +208,7 @@ async def bring_up_on_console(
     """Run the mission, show it to a person, and return the exit code."""
     zenoh_threads.few_threads()
     stream, output = sys.stdout if live else sys.stderr, None
-    if stream.isatty():
+    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # of a terminal or pipe the reader may pause
         output = TerminalOutput(stream.fileno(), lambda: None if live else _lines_are_missing(output), stream.encoding)
         output.drops = live
     file = cast("IO[str]", TerminalFile(output)) if output is not None else stream
@@ -222,7 +224,7 @@ async def bring_up_on_console(
 
 def _lines_are_missing(output: TerminalOutput | None) -> None:
     if output is not None:
-        output.write("lines are missing here, because this terminal was not read\n")
+        output.write("lines are missing here, because they were not read\n")
 
 
 async def _bring_up(description: MissionDescription, options: UpOptions, observer: ConsoleObserver) -> int:

@@ -1,6 +1,6 @@
-"""Writes a screen to its terminal; a terminal that does not read holds up nothing.
+"""Writes to a terminal or pipe; a reader that does not read holds up nothing.
 
-Otherwise the event loop would wait for the terminal, and with it a robot, an emergency stop, a mission and SIGTERM.
+Otherwise the event loop would wait for the reader, and with it a robot, an emergency stop, a mission and SIGTERM.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ MOST_WAITING_BYTES = 1 << 20  # chosen: the lines of a day in which much happens
 
 
 class TerminalOutput:
-    """The output of one terminal.
+    """The output of one terminal or pipe.
 
     Law: ``write`` returns at once, in order, and never a part of a text is lost. Pictures are dropped if the terminal
     has not taken a text for ``BEHIND_S``, and everything if ``MOST_WAITING_BYTES`` wait; once the terminal has taken
     what waited, ``caught_up`` is called.
 
     Args:
-        descriptor: File descriptor of the terminal.
+        descriptor: File descriptor of the terminal or pipe.
         caught_up: Called in another thread after texts were dropped: a picture has to be drawn anew.
         encoding: Of the terminal.
 
@@ -41,6 +41,11 @@ class TerminalOutput:
         self._has_dropped = self._is_gone = False
         self._news = threading.Condition()
         threading.Thread(target=self._run, name="terminal-output", daemon=True).start()
+
+    @property
+    def is_terminal(self) -> bool:
+        """Whether it is a terminal."""
+        return os.isatty(self._descriptor)
 
     def write(self, text: str) -> None:
         """Write the text as soon as the terminal takes it."""
@@ -95,7 +100,7 @@ class TerminalOutput:
 
 
 class TerminalFile(io.TextIOBase):
-    """A text file for printing to a terminal by its ``TerminalOutput``."""
+    """A text file for printing by a ``TerminalOutput``."""
 
     def __init__(self, output: TerminalOutput) -> None:
         super().__init__()
@@ -107,5 +112,5 @@ class TerminalFile(io.TextIOBase):
         return len(text)
 
     def isatty(self) -> bool:
-        """Return True."""
-        return True
+        """Return whether the output is a terminal."""
+        return self._output.is_terminal
