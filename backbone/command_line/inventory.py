@@ -21,10 +21,10 @@ from backbone.command_line.inventory_screen import (
     type_tables,
     types_table,
 )
-from backbone.command_line.tables import console_of_width
+from backbone.command_line.tables import console_of_width, print_on
 from backbone.command_line.where import Where
 from backbone.component_database.messages import TypeCount, UnknownType
-from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.endings import ExitCode, say, show
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import did_you_mean
 from backbone.picture.look import types_of
@@ -47,7 +47,7 @@ async def print_types(where: Where, name: str, *, as_json: bool, width: int | No
         types = await types_of(bus)
         chosen = [_named(name, types)] if name else types
         if as_json:
-            print(json.dumps({"mission": bus.mission, "types": [type_json(one) for one in chosen]}))
+            show([json.dumps({"mission": bus.mission, "types": [type_json(one) for one in chosen]})])
         else:
             _draw(width, type_tables(chosen[0]) if name else types_table(chosen))
     return ExitCode.DONE
@@ -67,7 +67,7 @@ async def print_resources(where: Where, name: str, *, changes: bool, as_json: bo
     uses = _only(name, uses) if name else uses
     if as_json:
         shown = [resource_json(picture, one) for one in uses]
-        print(json.dumps({"mission": picture.mission, "at_s": picture.at_s, "resources": shown}))
+        show([json.dumps({"mission": picture.mission, "at_s": picture.at_s, "resources": shown})])
         return ExitCode.DONE
     _draw(width, resources_table(picture, uses))
     if changes:
@@ -106,4 +106,4 @@ def _only(name: str, uses: list[ResourceUse]) -> list[ResourceUse]:
 
 
 def _draw(width: int | None, shown: RenderableType) -> None:
-    console_of_width(width).print(shown)
+    print_on(console_of_width(width), shown)

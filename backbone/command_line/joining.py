@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from backbone.command_line.event_loop import interruptible
 from backbone.command_line.unusable_file import FileUnusable, new_file
 from backbone.launcher.endings import ExitCode, say
+from backbone.operating_system.ending_signals import interruptible
 from backbone.recording.clock_offsets import ClockOffsets, Offset
 from backbone.recording.joining import join
 from backbone.recording.reader import NoRecording, Recording, open_file

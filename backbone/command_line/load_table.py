@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.command_line.connection import connected
-from backbone.command_line.tables import console_of_width
+from backbone.command_line.tables import console_of_width, print_on
 from backbone.command_line.where import Where
 from backbone.component.messages import AskStatistics, Statistics
 from backbone.errors import LinkError, Refusal
-from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.endings import ExitCode, say, show
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.picture.load import LoadReading, Loads, loads
 from backbone.picture.screen import table
@@ -39,7 +39,7 @@ async def print_loads(where: Where, for_s: float, *, as_json: bool, width: int |
         then = await _reading(bus, listed)
         found = loads(listed.components, await _schedule(bus), first, then)
         if as_json:
-            print(json.dumps({"mission": bus.mission, "for_s": then.at_s - first.at_s, **plain(found)}))
+            show([json.dumps({"mission": bus.mission, "for_s": then.at_s - first.at_s, **plain(found)})])
         else:
             _draw(found, width)
     return ExitCode.DONE
@@ -76,7 +76,7 @@ def _draw(found: Loads, width: int | None) -> None:
         ("processes", ("host", "pid", "cores", "processor time", "components"), _process_rows(found)),
     ):
         if rows := list(rows):
-            console.print(table(title, columns, rows))
+            print_on(console, table(title, columns, rows))
     if found.silent:
         say(f"no answer from {', '.join(found.silent)}")
 

@@ -20,7 +20,6 @@ from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
-from backbone.command_line.event_loop import interruptible
 from backbone.command_line.joining import clock_lines, clocks_json
 from backbone.command_line.message_lines import message_json, message_line
 from backbone.command_line.options import DISTRIBUTION
@@ -38,7 +37,7 @@ from backbone.launcher.recorder_signs import RecorderSigns
 from backbone.mission_log.lines import event_json, story_lines
 from backbone.mission_log.log import FOR_EVER_S, AskLog, MissionLog
 from backbone.mission_log.operators import OperatorActed, login_name
-from backbone.operating_system.ending_signals import orders_to_end
+from backbone.operating_system.ending_signals import interruptible, orders_to_end
 from backbone.operating_system.own_process import go_behind_others
 from backbone.printable import printable_all
 from backbone.recording.clock_offsets import ClockObserver

@@ -20,7 +20,7 @@ from backbone.command_line.where import Where
 from backbone.component.messages import Absence
 from backbone.creator.process_table import is_stopped
 from backbone.errors import HubUnreachable, LinkError
-from backbone.launcher.endings import ExitCode
+from backbone.launcher.endings import ExitCode, show
 from backbone.naming import component_of
 from backbone.picture.health import HealthWord
 from backbone.picture.look import look
@@ -52,7 +52,7 @@ class JsonLines:
 
     def show(self, picture: MissionPicture) -> None:
         """Print one."""
-        print(json.dumps(picture.to_json()), flush=True)
+        show([json.dumps(picture.to_json())])
 
     async def keep_showing(self, pictures: AsyncIterator[MissionPicture]) -> None:
         """Print each, until there are no more."""

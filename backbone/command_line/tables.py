@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import AsyncIterator
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.live import Live
 
+from backbone.operating_system.ending_signals import interruptible
 from backbone.picture.mission import MissionPicture
 from backbone.picture.screen import live_screen, screen
 
@@ -27,7 +29,7 @@ class MissionTables:
 
     def show(self, picture: MissionPicture) -> None:
         """Print one."""
-        self._console.print(screen(picture))
+        print_on(self._console, screen(picture))
 
     async def keep_showing(self, pictures: AsyncIterator[MissionPicture]) -> None:
         """Show each in the place of the one before, until there are no more."""
@@ -35,6 +37,12 @@ class MissionTables:
         with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
             async for picture in pictures:
                 live.update(live_screen(picture, None, console.height), refresh=True)
+
+
+def print_on(console: Console, shown: RenderableType) -> None:
+    """Print it; Ctrl-C ends it also while nobody reads."""
+    with interruptible([signal.SIGINT]):
+        console.print(shown)
 
 
 def console_of_width(width: int | None) -> Console:

@@ -30,7 +30,7 @@ from backbone.command_line.where import Where
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.launcher.endings import ExitCode, say, show
+from backbone.launcher.endings import ExitCode, say
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.recording.hearing import Hearing, to_overhear
@@ -106,22 +106,27 @@ async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
 
     async with connected(where) as (bus, clock), overhearing(bus, clock, wanted.keys, heard) as subscribed:
         async with until_ended(bus, clock, wanted.for_s) as ended:
+            printer = LinePrinter(ended.set)
             while not ended.is_set():
                 traffic.rows.clear()
                 began_s = clock.now_s()
                 await set_within(ended, None if once else LOOK_EACH_S)
                 heard_rows = traffic.busiest((clock.now_s() - began_s) / clock.rate)
-                await _show_rates(bus, heard_rows, wanted)
+                await _show_rates(bus, heard_rows, wanted, printer)
                 await clock.sleep_s(ANSWERS_HEARD_S * clock.rate)
+        await printer.end()
         if dropped := sum(one.dropped for one in subscribed):
             say(f"incomplete: {counted(dropped, 'message')} came too fast")
+        if printer.dropped:
+            say(f"incomplete: {counted(printer.dropped, 'line')} came faster than they were read")
     return ExitCode.DONE
 
 
-async def _show_rates(bus: Bus, heard: Sequence[TrafficRow], wanted: Watched) -> None:
+async def _show_rates(bus: Bus, heard: Sequence[TrafficRow], wanted: Watched, printer: LinePrinter) -> None:
     facts = await ask_facts(bus)
     rows = with_facts(heard, facts, bus.mission, wanted.keys)
-    show(map(json.dumps, rows) if wanted.as_json else [*traffic_lines(rows), ""])
+    for line in map(json.dumps, rows) if wanted.as_json else [*traffic_lines(rows), ""]:
+        printer.put(line)
     if facts.silent:
         say(f"without the counts of {', '.join(sorted(facts.silent))}, which did not answer")
 

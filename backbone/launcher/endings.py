@@ -5,12 +5,14 @@ Data goes to stdout, messages to stderr. Exit codes are those of ARCHITECTURE.md
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
 from enum import IntEnum
 
 from backbone.errors import BackboneError, HubUnreachable, LinkError, Refusal, code_of
+from backbone.operating_system.ending_signals import interruptible
 from backbone.printable_text import printable_lines
 
 
@@ -34,9 +36,10 @@ def say(line: str) -> None:
 
 
 def show(lines: Iterable[str]) -> None:
-    """Print data on stdout as printable text."""
+    """Print data on stdout as printable text; Ctrl-C ends it also while nobody reads. In the main thread."""
     for line in lines:
-        print(printable_lines(line, most=sys.maxsize), flush=True)
+        with interruptible([signal.SIGINT]):
+            print(printable_lines(line, most=sys.maxsize), flush=True)
 
 
 def complaint_of(error: BackboneError) -> tuple[str, ExitCode]:

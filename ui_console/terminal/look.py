@@ -22,8 +22,9 @@ from backbone.debug_views import UnknownView, ViewEntry, ViewKind, ViewPicture, 
 from backbone.errors import LinkError, Refusal
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.naming import component_of, did_you_mean
+from backbone.printable_text import printable_lines
 from ui_console.model.debug_views import shown_text, view_rows
-from ui_console.session.joining import end_server_on_signals, write_line
+from ui_console.session.joining import end_server_on_signals, line_writer
 from ui_console.session.looking import find_behavior, keep_looking, pixels_of, views_of
 from ui_console.terminal.look_app import LookApp
 from ui_console.terminal.pixels import can_show_pixels, png
@@ -102,7 +103,8 @@ async def _shown(looked: _Looked, options: LookOptions) -> ExitCode:
     if options.save is not None:
         return await _save(looked, options.save, options.for_s)
     if options.as_json or looked.entry.kind is ViewKind.VALUE:
-        return await looked.until_end(_printer(as_json=options.as_json), options.for_s)
+        async with line_writer() as write:
+            return await looked.until_end(_printer(write, as_json=options.as_json), options.for_s)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise NoTerminal(f"the picture {looked.entry.view} needs a terminal")
     return await _live(looked, options.for_s)
@@ -181,16 +183,16 @@ class _Looked:
         return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
 
 
-def _printer(*, as_json: bool) -> Callable[[ViewPicture | ViewValue], None]:
+def _printer(write: Callable[[bytes], None], *, as_json: bool) -> Callable[[ViewPicture | ViewValue], None]:
     """Return a function that prints values: all values as JSON, but for people only changed values."""
     before: list[object] = []
 
     def print_it(shown: ViewPicture | ViewValue) -> None:
         if as_json:
-            write_line(json.dumps(shown_json(shown)).encode())
+            write(json.dumps(shown_json(shown)).encode())
         elif isinstance(shown, ViewValue) and before != [shown.value]:
             before[:] = [shown.value]
-            show([f"{shown.at_s:9.2f} s  {shown_text(shown.value)}"])
+            write(printable_lines(f"{shown.at_s:9.2f} s  {shown_text(shown.value)}", most=sys.maxsize).encode())
 
     return print_it
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import signal
 import subprocess
 import sys
@@ -18,7 +19,8 @@ from backbone.command_line import comparing, event_loop, exporting, foxglove_cop
 from backbone.command_line.unusable_file import new_folder
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
-from backbone.launcher.endings import ExitCode
+from backbone.launcher.endings import ExitCode, show
+from backbone.operating_system.ending_signals import interruptible
 from backbone.recording import reader
 
 MESSAGES, READ = 100, 10
@@ -91,6 +93,27 @@ def test_it_ends_at_once_and_leaves_nothing(
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+class _Interrupting(io.StringIO):
+    """An output at which a Ctrl-C comes while a line is written."""
+
+    def write(self, text: str) -> int:
+        signal.raise_signal(signal.SIGINT)
+        return super().write(text)
+
+
+def test_it_ends_while_its_output_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    output = _Interrupting()
+    monkeypatch.setattr("sys.stdout", output)
+
+    async def command() -> ExitCode:
+        show(["a line", "another"])
+        return ExitCode.DONE
+
+    with pytest.raises(KeyboardInterrupt):
+        event_loop.exit_code_of(command)
+    assert output.getvalue() == ""
+
+
 @pytest.mark.processes
 @pytest.mark.timeout(60)
 def test_a_component_that_hangs_in_a_rerun_holds_up_no_ctrl_c(night: Path) -> None:
@@ -101,7 +124,7 @@ def test_a_component_that_hangs_in_a_rerun_holds_up_no_ctrl_c(night: Path) -> No
 @pytest.mark.parametrize("order", [signal.SIGTERM, signal.SIGHUP])
 def test_an_order_to_end_leaves_nothing_half_written(order: signal.Signals, tmp_path: Path) -> None:
     def write() -> None:
-        with event_loop.interruptible(), new_folder(tmp_path / "new"):
+        with interruptible(), new_folder(tmp_path / "new"):
             assert signal.getsignal(order) is not signal.SIG_DFL  # else the order would end this test run
             signal.raise_signal(order)
 
@@ -118,7 +141,7 @@ def test_an_order_to_end_leaves_nothing_half_written(order: signal.Signals, tmp_
 def test_where_a_shell_ignores_ctrl_c_it_stays_ignored() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with event_loop.interruptible():
+        with interruptible():
             signal.raise_signal(signal.SIGINT)
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:

@@ -134,7 +134,7 @@ def test_a_bug_of_a_listener_ends_the_command() -> None:
     ids=["watch", "watch --rate", "top --for"],
 )
 def test_who_watches_a_mission_ends_with_it(
-    command: Callable[[], Awaitable[ExitCode]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: Callable[[], Awaitable[ExitCode]], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     @asynccontextmanager
     async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
@@ -147,7 +147,7 @@ def test_who_watches_a_mission_ends_with_it(
 
     monkeypatch.setattr(watching, "connected", connected)
     assert run_virtual(play()) == pytest.approx(20.0 + GONE_AFTER_S, abs=1.0)
-    assert "night has ended" in capsys.readouterr().err
+    assert "night has ended" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(("field", "is_told"), [("what", False), ("waht", True)])
