@@ -310,6 +310,8 @@ def _check_private(directory: Path) -> None:
 def _read(path: Path) -> RunFile | None:
     """Return the run file at this path; None if it is missing, unreadable, or from another release."""
     try:
+        if not path.is_file():  # a pipe would be waited for
+            return None
         return msgspec.json.decode(path.read_bytes(), type=RunFile)
     except (OSError, msgspec.DecodeError):  # one folder of another account must not hide all missions
         return None

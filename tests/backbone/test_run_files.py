@@ -83,6 +83,16 @@ def test_a_broken_file_is_passed_over() -> None:
         run_files.find()
 
 
+@pytest.mark.timeout(30)
+def test_a_pipe_or_a_folder_in_the_place_of_the_file_is_not_waited_for(runtime_directory: Path) -> None:
+    run_files.write(up("there"))
+    for mission, make in (("pipe", os.mkfifo), ("folder", os.mkdir)):
+        folder = runtime_directory / "scout-backbone" / mission
+        folder.mkdir()
+        make(folder / run_files.FILE_NAME)
+    assert [one.mission for one in run_files.find_all()] == ["there"]
+
+
 def test_a_folder_that_cannot_be_read_hides_no_mission(runtime_directory: Path) -> None:
     run_files.write(up("iros2001"))
     (runtime_directory / "scout-backbone" / "loop").symlink_to("loop")
