@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from backbone.command_line.joining import finite
 from backbone.command_line.recording_work import opened
 from backbone.command_line.unusable_file import FileUnusable
 from backbone.keys import Conversation
@@ -121,7 +122,10 @@ def _short(value: object) -> str:
 
 def _json(named: Named, found: KeyComparison) -> dict[str, object]:
     key, source, schema = named
-    errors = {path: {"rms": one.rms, "largest": one.largest, "count": one.count} for path, one in found.errors.items()}
+    errors = {
+        path: {"rms": finite(one.rms), "largest": finite(one.largest), "count": one.count}
+        for path, one in found.errors.items()
+    }
     return {
         "key": key,
         "source": source,

@@ -72,8 +72,8 @@ def clocks_json(clocks: ClockOffsets) -> dict[str, dict[str, float | None]]:
     """Return the bounds of each clock except the reference's; None: no cause bounds it on that side."""
     return {
         host: {
-            "at_least_s": _finite(offset.at_least_s),
-            "at_most_s": _finite(offset.at_most_s),
+            "at_least_s": finite(offset.at_least_s),
+            "at_most_s": finite(offset.at_most_s),
             "taken_s": offset.taken_s,
             "moved_s": offset.moved_s,
         }
@@ -81,5 +81,6 @@ def clocks_json(clocks: ClockOffsets) -> dict[str, dict[str, float | None]]:
     }
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """Return the number, or None in the place of one that JSON cannot represent."""
     return value if math.isfinite(value) else None

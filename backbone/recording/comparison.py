@@ -35,23 +35,23 @@ class NumberError:
 
     Attributes:
         largest: Largest distance.
-        squares: Sum of the squares of all distances.
+        root: Square root of the sum of the squares of all distances.
         count: Number of compared pairs.
     """
 
     largest: float = 0.0
-    squares: float = 0.0
+    root: float = 0.0
     count: int = 0
 
     @property
     def rms(self) -> float:
         """Root of the mean square of the distances."""
-        return math.sqrt(self.squares / self.count) if self.count else 0.0
+        return self.root / math.sqrt(self.count) if self.count else 0.0
 
     def add(self, distance: float) -> None:
         """Count one pair of numbers."""
         self.largest = max(self.largest, distance)
-        self.squares += distance * distance
+        self.root = math.hypot(self.root, distance)  # the squares themselves may be too large for a number
         self.count += 1
 
 

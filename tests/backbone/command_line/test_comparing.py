@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import math
+
 import pytest
 from small_recordings import SCOUT, Said, recorded
 
+from backbone.command_line import comparing
 from backbone.command_line.comparing import print_comparison
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
-from backbone.recording.comparison import compared
+from backbone.recording.comparison import KeyComparison, NumberError, compared
 from backbone.recording.reader import Recording
 
 OTHER = "resource_pool/scout2"
@@ -35,3 +39,19 @@ def test_of_equal_recordings_no_difference_is_named(capsys: pytest.CaptureFixtur
     found = compared(events("a", "b").messages(), events("a", "b").messages())
     assert print_comparison(found, as_json=False) is ExitCode.DONE
     assert "0 of 2 keys differ\n" in capsys.readouterr().err
+
+
+def test_differences_too_large_for_a_number_are_json() -> None:
+    found = NumberError()
+    found.add(1e155)
+    found.add(1e155)
+    assert found.rms == pytest.approx(1e155)
+    found.add(math.inf)  # of 1e308 and -1e308
+    comparison = KeyComparison(3, 3, 3, None, {"x_m": found})
+    with pytest.MonkeyPatch.context() as patched:
+        shown: list[str] = []
+        patched.setattr(comparing, "show", shown.extend)
+        print_comparison({("key", "source", "Thing/1"): comparison}, as_json=True)
+    assert json.loads(shown[0], parse_constant=pytest.fail)["errors"] == {
+        "x_m": {"rms": None, "largest": None, "count": 3}
+    }
