@@ -7,11 +7,11 @@ import math
 import os
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 import msgspec
 from mcap.exceptions import McapError
@@ -27,7 +27,9 @@ from backbone.recording.translation import Translated
 from backbone.recording.writer import ABOUT, NS, PROFILE
 
 MOST_RECORD_BYTES = 64 * 1024 * 1024  # chosen: eight times the largest message; a damaged length asks for terabytes
+ROOM = 20  # chosen: twice the calls from a command's loop over messages to the encoder of JSON
 DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
+Decoded = TypeVar("Decoded")
 _END = struct.Struct("<BQQQI8x")  # MCAP specification, op 0x02 and the magic: the end of every whole file
 
 
@@ -52,7 +54,7 @@ class Recorded:
     Attributes:
         key: Key expression on the bus; empty: not known.
         source: Address of the sender.
-        schema: ``<Name>/<version>``; empty: the bytes were no message.
+        schema: ``<Name>/<version>``; empty: the bytes were no message, or are nested too deeply to be decoded.
         at_s: Mission time of sending, by which the recording is ordered; if that is not credible, of arrival.
         stamp_s: Mission time of sending, as stated by the sender.
         heard_s: Mission time when the recorder got it.
@@ -291,12 +293,20 @@ def heard_now(key: str, message: Translated, at_s: float) -> Recorded:
     return Recorded(key, message.source, message.schema, at_s, **msgspec.json.decode(message.data))
 
 
+def _with_room(decode: Callable[[bytes], Decoded], data: bytes, room: int = ROOM) -> Decoded:
+    """Return what was decoded; raise ``RecursionError`` also if it could not be encoded again a few calls deeper."""
+    return _with_room(decode, data, room - 1) if room else decode(data)
+
+
 def _recorded(channel: Channel, message: Message) -> Recorded:
     key, source, schema = _named(channel)
     at_s = message.log_time / NS
     if channel.message_encoding != "json":
         return Recorded(key, source, schema, at_s, at_s, at_s, message.sequence, "", message.data)
-    said = msgspec.json.decode(message.data)
+    try:
+        said = _with_room(msgspec.json.decode, message.data)
+    except RecursionError:
+        return Recorded(key, source, "", at_s, at_s, at_s, message.sequence, "", message.data)
     try:
         return Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)
     except TypeError as error:
