@@ -1,18 +1,22 @@
 """Recovering: writes the readable messages of a damaged recording, or of a killed recorder, to a whole recording.
 
-Rules of this file: a damaged chunk costs its own messages alone, and is counted. Of a file that is cut, or damaged
-between two chunks, the messages before that place are kept, and the command prints the length of the rest.
+Rules of this file: a damaged chunk costs its own messages alone, and is counted. Chunks are found by the index. Without
+one, of a file that is cut, or damaged between two chunks, the messages before that place are kept, and the command
+prints the length of the rest.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
 from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.summary import Summary
 from mcap.writer import CompressionType, Writer
 
 from backbone.recording.reader import DAMAGED, MOST_RECORD_BYTES, NoRecording, NotOfMessages, check_index, open_file
@@ -78,16 +82,17 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
         NoRecording: Not even the begin is there; ``NotOfMessages``: it is another program's file.
     """
     whole, lost, has_begun, has_all = _WholeRecording(to), 0, False, False
-    names, size = _names_in_index(damaged), damaged.seek(0, os.SEEK_END)
+    index, size = _index(damaged), damaged.seek(0, os.SEEK_END)
+    if index is not None and _is_of_a_bus(damaged):
+        lost = _take_by_index(whole, damaged, index)
+        whole.finish()
+        return Recovered(whole.messages, lost, 0)
     read_to = damaged.seek(0)
-    reader = StreamReader(
-        cast("Any", damaged), emit_chunks=True, validate_crcs=True, record_size_limit=MOST_RECORD_BYTES
-    )
     try:
-        for record in reader.records:
+        for record in _records(damaged, skip_magic=False):
             has_begun, has_all = True, has_all or isinstance(record, DataEnd)
             if isinstance(record, Chunk):
-                lost += not _took_chunk(whole, record, names)
+                lost += not _took_chunk(whole, record)
             else:
                 whole.take(record)
             read_to = read_to + _size(record) if isinstance(record, Chunk) else damaged.tell()
@@ -101,6 +106,42 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
         read_to = size if has_all else read_to  # the index follows; it is written again
     whole.finish()
     return Recovered(whole.messages, lost, size - read_to)
+
+
+def _take_by_index(whole: _WholeRecording, damaged: IO[bytes], index: Summary) -> int:
+    """Take all that the index names; return how many chunks could not be read, or not in full."""
+    for name in (*index.schemas.values(), *index.channels.values()):  # those of a damaged chunk too
+        with suppress(LookupError):
+            whole.take(name)
+    reader = SeekingReader(damaged, record_size_limit=MOST_RECORD_BYTES)
+    for others in (reader.iter_metadata, reader.iter_attachments):
+        with suppress(*DAMAGED):
+            for other in others():
+                whole.take(other)
+    lost = 0
+    for place in sorted(one.chunk_start_offset for one in index.chunk_indexes):
+        damaged.seek(place)
+        try:
+            chunk = next(_records(damaged, skip_magic=True), None)
+        except DAMAGED:
+            chunk = None
+        lost += not (isinstance(chunk, Chunk) and _took_chunk(whole, chunk))
+    return lost
+
+
+def _records(file: IO[bytes], *, skip_magic: bool) -> Iterator[McapRecord]:
+    options = {"skip_magic": skip_magic, "emit_chunks": True, "validate_crcs": True}
+    return StreamReader(cast("Any", file), **options, record_size_limit=MOST_RECORD_BYTES).records
+
+
+def _is_of_a_bus(file: IO[bytes]) -> bool:
+    file.seek(0)
+    try:
+        header = next(_records(file, skip_magic=False), None)
+    except DAMAGED:
+        header = None
+    file.seek(0)
+    return isinstance(header, Header) and header.profile == PROFILE
 
 
 def _size(chunk: Chunk) -> int:
@@ -124,14 +165,13 @@ def recover_file(path: Path, to: Path) -> Recovered:
             raise
 
 
-def _took_chunk(whole: _WholeRecording, chunk: Chunk, names: list[McapRecord]) -> bool:
+def _took_chunk(whole: _WholeRecording, chunk: Chunk) -> bool:
     """Take the records of a chunk; return whether all of them could be read."""
     try:
         records = breakup_chunk(chunk, validate_crc=True)
     except DAMAGED:
-        records, took = names, False  # a later chunk may need the names that this one gave
-    else:
-        took = True
+        return False
+    took = True
     for record in records:
         try:
             whole.take(record)
@@ -140,12 +180,12 @@ def _took_chunk(whole: _WholeRecording, chunk: Chunk, names: list[McapRecord]) -
     return took
 
 
-def _names_in_index(file: IO[bytes]) -> list[McapRecord]:
-    """Return the schemas and channels that the index has; none if it is damaged or not there."""
+def _index(file: IO[bytes]) -> Summary | None:
+    """Return the index; None: it is damaged or not there."""
     try:
         check_index(file)
-        summary = SeekingReader(file, record_size_limit=MOST_RECORD_BYTES).get_summary()
+        return SeekingReader(file, record_size_limit=MOST_RECORD_BYTES).get_summary()
     except (*DAMAGED, OSError):
-        summary = None
-    file.seek(0)
-    return [] if summary is None else [*summary.schemas.values(), *summary.channels.values()]
+        return None
+    finally:
+        file.seek(0)

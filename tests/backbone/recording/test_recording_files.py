@@ -158,11 +158,25 @@ def test_what_cannot_be_read_after_the_last_chunk_is_told_by_its_length() -> Non
     broken[second + 4] ^= 1  # its length
     for file, expected in (
         (data, (6, 0, 0)),
-        (bytes(broken), (4, 0, len(data) - third)),
+        (bytes(broken), (6, 0, 0)),  # the index has the place of the next chunk
+        (bytes(broken[:-20]), (4, 0, len(data) - 20 - third)),
         (data + data, (6, 0, len(data))),
         (data[:-20], (6, 0, 0)),  # the index is cut, no message
     ):
         assert recover(io.BytesIO(file), io.BytesIO()) == expected
+
+
+@pytest.mark.parametrize("at", [0, 1, 2])
+@pytest.mark.parametrize("byte", [0, 3, 8])
+def test_damage_between_chunks_costs_no_others_if_the_index_is_whole(at: int, byte: int) -> None:
+    """The begin of a chunk is its kind and its length; the library skips by this length, and what is of no kind."""
+    data, _ = recorded([0, 1] * 3, frozenset({1, 3}))
+    chunks = [one.chunk_start_offset for one in SeekingReader(io.BytesIO(data)).get_summary().chunk_indexes]  # type: ignore[union-attr]
+    broken, made = bytearray(data), io.BytesIO()
+    broken[chunks[at] + byte] ^= 0x70
+    messages, damaged, unread = recover(io.BytesIO(broken), made)
+    assert (messages + 2 * damaged, unread) == (6, 0)
+    assert [one.sequence for one in read(made.getvalue())] == [n for n in range(6) if not damaged or n // 2 != at]
 
 
 @pytest.mark.parametrize("at", [0, 1, 2])
