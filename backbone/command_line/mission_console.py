@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import os
 import stat
 import sys
@@ -208,7 +209,7 @@ async def bring_up_on_console(
     """Run the mission, show it to a person, and return the exit code."""
     zenoh_threads.few_threads()
     stream, output = sys.stdout if live else sys.stderr, None
-    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):  # of a terminal or pipe the reader may pause
+    if _may_pause(stream):
         output = TerminalOutput(stream.fileno(), lambda: None if live else _lines_are_missing(output), stream.encoding)
         output.drops = live
     file = cast("IO[str]", TerminalFile(output)) if output is not None else stream
@@ -220,6 +221,14 @@ async def bring_up_on_console(
     finally:
         if output is not None:
             output.wait_written(ENDS_WITHIN_S)
+
+
+def _may_pause(stream: IO[str]) -> bool:
+    """Return whether a reader takes what is written, as of a terminal or pipe; a file or a buffer takes it at once."""
+    try:
+        return not stat.S_ISREG(os.fstat(stream.fileno()).st_mode)
+    except io.UnsupportedOperation:  # a program that runs this command in its own process keeps the output in memory
+        return False
 
 
 def _lines_are_missing(output: TerminalOutput | None) -> None:
