@@ -126,7 +126,7 @@ def test_the_recorded_rules_given_as_other_rules_make_no_difference(recorded: Re
 
 def test_what_other_rules_decide_of_themselves_between_recorded_events_is_a_difference(recorded: RecordMission):
     """An ARC rises by waiting alone: nothing happened then that the recording could have."""
-    found = [decided_anew(recorded(seed), aging_s=0.5).difference for seed in SEEDS]
+    found = [decided_anew(recorded(seed), aging_s=1.0).difference for seed in SEEDS]
     named = [one for one in found if one is not None and isinstance(one.event, Woken)]
     assert named
     for one in named:
