@@ -6,7 +6,7 @@ Rules of this file:
 * A new driver takes over while no call is in progress. While no device is open, asynchronous calls wait, and what
   synchronous calls raise is dropped, because the RC repeats its settings afterwards.
 * While a driver is on trial, its bugs and hardware faults, and calls that hang, reach the RC only if the old driver
-  cannot do the same call.
+  cannot do the same call. A value that the RC cannot use, returned or delivered, is a hardware fault too.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ from backbone.waiting import only_bugs
 from resource_pool.drivers.interface import HardwareFault
 
 HANGS_S = 0.2  # chosen: the old driver still has as long until the RC itself gives a call up; machine seconds
+Judge = Callable[[str, object], object]
+"""Name of a method, and what it returned → what the RC uses; raises ``HardwareFault`` if the RC cannot use it."""
+
 SLOTS_KEPT = 64  # chosen: more than the kinds of drivers in one process
 
 
@@ -39,7 +42,15 @@ class DriverSlot:
         has_device: False: no device is open, until the gate is opened.
     """
 
-    def __init__(self, driver: object) -> None:
+    def __init__(self, driver: object, judge: Judge, fail: Callable[[BaseException], None]) -> None:
+        """Pass calls to this driver.
+
+        Args:
+            driver: The driver.
+            judge: Reads what its methods return.
+            fail: Called with the hardware fault if a driver that is not on trial delivers a value of no use.
+        """
+        self._judge, self._fail = judge, fail
         self.proxy: Any = _proxy_class(type(driver))(self)  # type: ignore[arg-type]  # mypy: classes have no hash
         self.works = driver
         self.on_trial: Callable[[BaseException], asyncio.Event | None] = lambda _error: None
@@ -77,7 +88,8 @@ class DriverSlot:
         """Call a synchronous method."""
         driver = self.works
         try:
-            done: object = getattr(driver, name)(*(self._while_works(driver, one) for one in arguments), **named)
+            done = getattr(driver, name)(*(self._while_works(driver, one) for one in arguments), **named)
+            done = self._judge(name, done)
         except UNPROVED as error:
             if not self.has_device and not _is_no_fault(error):
                 return None
@@ -100,6 +112,7 @@ class DriverSlot:
             given = [self._while_works(driver, one) for one in arguments]
             call: Awaitable[object] = getattr(driver, name)(*given, **named)
             done = await only_bugs(_within(HANGS_S, call) if self.is_tried else call, f"{name} of a driver")
+            done = self._judge(name, done)
             self.calls += 1
             return done
         except UNPROVED as error:
@@ -117,12 +130,22 @@ class DriverSlot:
         return await self.call_later(name, arguments, named)
 
     def _while_works(self, driver: object, given: object) -> object:
-        """Wrap a callback so that it is called only while this driver works; return any other argument unchanged."""
+        """Wrap a callback so that it is called only while this driver works; return any other argument unchanged.
+
+        A driver may call from where an exception is lost, so it gets none.
+        """
         if not callable(given):
             return given
 
         def heard(*what: object) -> object:
-            return given(*what) if self.works is driver else None
+            if self.works is not driver:
+                return None
+            try:
+                return given(*what)
+            except HardwareFault as fault:
+                if self.on_trial(fault) is None:
+                    self._fail(fault)
+                return None
 
         return heard
 

@@ -75,7 +75,7 @@ class CommandRadio(ResourceController[RcParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._driver: RadioDriver = self.make_driver()
+        self._driver: RadioDriver = self.make_driver(judge=self._credible)
         self._schedule = PacketSchedule()
         self._slow = SlowPackets(EVERY_S * max(1.0, clock.rate))
         self._owed: deque[Sending] = deque()
@@ -299,7 +299,7 @@ class CommandRadio(ResourceController[RcParameters]):
                 )
         except TimeoutError:
             raise HardwareFault(f"{self.name} accepted no packet within {TRANSMIT_WITHIN_S} s") from None
-        took_s = self.clock.now_s() - begun_s if reported_s is None else self._credible(reported_s)
+        took_s = self.clock.now_s() - begun_s if reported_s is None else reported_s
         self._air_free_s = max(self._air_free_s, begun_s + took_s)
         self._sent += 1
         self._on_air_s += took_s
@@ -310,14 +310,16 @@ class CommandRadio(ResourceController[RcParameters]):
             log.warning("%s: %s", packet.arc, news)
             self.publish_event(packet.arc, f"on {self.name}: {news}")
 
-    def _credible(self, reported_s: float) -> float:
-        """Return the driver's time on the air, unless it is no number or would block the air for no real reason."""
+    def _credible(self, method: str, returned: object) -> object:
+        """Refuse a time on the air that is no number or would block the air for no real reason."""
+        if method != "transmit" or returned is None:
+            return returned
         try:
-            took_s = float(reported_s)
+            took_s = float(returned)  # type: ignore[arg-type]  # a driver may return anything
         except (TypeError, ValueError):
             took_s = math.nan
         if not 0 <= took_s <= LONGEST_PACKET_S:
-            raise HardwareFault(f"the driver of {self.name} reports {reported_s!r} s on the air for one packet")
+            raise HardwareFault(f"the driver of {self.name} reports {returned!r} s on the air for one packet")
         return took_s
 
     def _measured(self, sending: Sending, took_s: float) -> None:

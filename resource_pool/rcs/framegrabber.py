@@ -181,8 +181,8 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             return  # a driver may deliver one picture after its stop
         try:
             self._take(hold, order, picture, numbers)
-        except (ValueError, TypeError) as wrong:  # not raised, because a driver may call from a callback that loses it
-            self.fail(HardwareFault(f"the driver of {self.name} delivers a wrong picture: {wrong}"))
+        except (ValueError, TypeError) as wrong:
+            raise HardwareFault(f"the driver of {self.name} delivers a wrong picture: {wrong}") from wrong
 
     def _take(self, hold: Hold, order: Tune, picture: Picture, numbers: Iterator[int]) -> None:
         """Publish the picture if it is in time and wanted.

@@ -24,7 +24,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
 from resource_pool.commands import Command, Halt, SwitchTransmitter
-from resource_pool.drivers.interface import ReplyReader, RobotProtocol
+from resource_pool.drivers.interface import HardwareFault, ReplyReader, RobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, AskReadings, LoadPacket, NotFromYou, PacketLoaded
 from resource_pool.resource_controller import RcParameters, ResourceController
@@ -87,7 +87,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._protocol: RobotProtocol = self.make_driver(self.parameters.protocol)
+        self._protocol: RobotProtocol = self.make_driver(self.parameters.protocol, judge=self._of_bytes)
         self._radio = (self.parameters.links.get("command_radio") or [""])[0]
         self._halt_at_s: float | None = None
         self._driven = asyncio.Event()
@@ -386,3 +386,10 @@ class RobotRc(ResourceController[P], Generic[P]):
     def _silent_too_long(self) -> bool:
         """Return whether no command has arrived during the sleep."""
         return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s
+
+    def _of_bytes(self, method: str, returned: object) -> object:
+        """Refuse what is not of bytes from a method that returns a packet."""
+        declared = getattr(getattr(self.driver_protocol, method, None), "__annotations__", {}).get("return")
+        if declared in (bytes, "bytes") and not isinstance(returned, bytes | bytearray | memoryview):
+            raise HardwareFault(f"{method} of the protocol of {self.name} returns {type(returned).__name__}, no bytes")
+        return returned

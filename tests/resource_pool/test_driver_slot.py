@@ -18,12 +18,20 @@ from resource_pool.holds import Hold
 from resource_pool.messages import Applied
 from resource_pool.rcs.skeleton import Lamp, PaintedLamp, Shine
 
-OWN_NAMES = sorted(name for name in vars(DriverSlot(object())).keys() | vars(DriverSlot) if not name.startswith("_"))
+
+def slot_of(driver: object) -> DriverSlot:
+    def fail(fault: BaseException) -> None:
+        raise fault
+
+    return DriverSlot(driver, lambda _method, returned: returned, fail)
+
+
+OWN_NAMES = sorted(name for name in vars(slot_of(object())).keys() | vars(DriverSlot) if not name.startswith("_"))
 
 
 @pytest.mark.parametrize("name", OWN_NAMES)
 def test_a_method_with_a_name_of_the_slot_reaches_the_driver(name: str) -> None:
-    slot = DriverSlot(type("Door", (), {name: lambda _self, way_m: f"{name} {way_m}"})())
+    slot = slot_of(type("Door", (), {name: lambda _self, way_m: f"{name} {way_m}"})())
     assert getattr(slot.proxy, name)(0.5) == f"{name} 0.5"
     assert slot.calls == 1
 
@@ -34,7 +42,7 @@ def test_an_asynchronous_one_waits_while_the_gate_is_shut(name: str) -> None:
         return f"{name} {way_m}"
 
     async def main() -> None:
-        slot = DriverSlot(type("Door", (), {name: method})())
+        slot = slot_of(type("Door", (), {name: method})())
         slot.shut()
         called = asyncio.create_task(getattr(slot.proxy, name)(0.5))
         await asyncio.sleep(0)
@@ -47,13 +55,13 @@ def test_an_asynchronous_one_waits_while_the_gate_is_shut(name: str) -> None:
 
 @pytest.mark.parametrize("name", OWN_NAMES)
 def test_a_value_with_a_name_of_the_slot_is_the_drivers(name: str) -> None:
-    assert getattr(DriverSlot(type("Door", (), {name: 0.5})()).proxy, name) == 0.5
+    assert getattr(slot_of(type("Door", (), {name: 0.5})()).proxy, name) == 0.5
 
 
 @pytest.mark.parametrize("name", [*OWN_NAMES, "motion"])
 def test_a_value_that_is_set_is_the_drivers(name: str) -> None:
     driver = type("Door", (), {name: 0.5})()
-    setattr(DriverSlot(driver).proxy, name, 1.0)
+    setattr(slot_of(driver).proxy, name, 1.0)
     assert getattr(driver, name) == 1.0
 
 
