@@ -78,6 +78,7 @@ class SharedProcessKeeper:
         self._bus: Bus | None = None
         self._alarm = Alarm(clock, task, self._woken, "shared processes' alarm")
         self._talks: dict[int, set[asyncio.Task[None]]] = {}
+        self._launches: dict[int, Launch] = {}
 
     def use(self, bus: Bus) -> None:
         """Use this bus from now on to reach shared processes."""
@@ -111,7 +112,8 @@ class SharedProcessKeeper:
         """Report the end of the process to all its members."""
         for talk in self._talks.pop(pid, set()):
             talk.cancel()
-        self._carry_out(self._shared.exited(pid, returncode))
+        cause = cause_of_end(self._launches.pop(pid, None), pid, returncode)
+        self._carry_out(self._shared.exited(pid, returncode, cause))
 
     def _carry_out(self, instructions: list[ProcessInstruction]) -> None:
         for instruction in instructions:
@@ -132,8 +134,8 @@ class SharedProcessKeeper:
                     self._report(self._supervision.forked(name, pid, self._now_s()))
                 case MemberNotStarted(name=name, why=why, returncode=returncode):
                     self._report(self._supervision.fork_failed(name, why, self._now_s(), returncode))
-                case MemberGone(name=name, returncode=returncode, how=how):
-                    self._report(self._supervision.left(name, returncode, how, self._now_s()))
+                case MemberGone(name=name, returncode=returncode, how=how, cause=cause):
+                    self._report(self._supervision.left(name, returncode, how, self._now_s(), cause))
                 case ProcessesWakeAt(at_s=at_s):
                     self._alarm.set(at_s)
                 case _:
@@ -154,6 +156,7 @@ class SharedProcessKeeper:
         except NoProcess as error:
             self._carry_out(self._shared.fork_failed(process, str(error)))
             return
+        self._launches[pid] = launch
         self._carry_out(self._shared.forked(process, pid, self._now_s()))
 
     async def _share_life(self, bus: Bus, at: str, launch: Launch, pid: int, life: int) -> None:

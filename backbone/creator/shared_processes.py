@@ -95,11 +95,13 @@ class MemberGone:
     Attributes:
         returncode: Exit code of the member, or return code of its process.
         how: How it ended, for people.
+        cause: What ended its process, or the place at which its process hung; empty: unknown.
     """
 
     name: str
     returncode: int
     how: str
+    cause: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,13 +239,13 @@ class SharedProcesses:
                 return self._leaves(one, member, MemberGone(member.name, exit_code, describe(exit_code, cause)), now_s)
         return []
 
-    def exited(self, pid: int, returncode: int) -> list[ProcessInstruction]:
-        """Record that the whole process tree has ended."""
+    def exited(self, pid: int, returncode: int, cause: str = "") -> list[ProcessInstruction]:
+        """Record that the whole process tree has ended, because of this cause; empty: unknown."""
         one = next((process for process in self._all.values() if process.pid == pid), None)
         if one is None:
             return []
         del self._all[one.name]
-        how = f"its process {one.name}: {one.failure or describe(returncode)}"
+        how = f"its process {one.name}: {one.failure or describe(returncode, cause)}"
         was_ended = one.phase is _Phase.ENDING and not one.failure
         instructions: list[ProcessInstruction] = []
         left: dict[str, _Membership] = {}
@@ -251,7 +253,7 @@ class SharedProcesses:
             if member.report is not None:
                 instructions.append(member.report)
             elif member.place is _Place.LIVING:
-                instructions.append(MemberGone(member.name, returncode, how))
+                instructions.append(MemberGone(member.name, returncode, how, cause))
             elif was_ended:
                 left[member.name] = _Membership(member.name)
             else:  # a start is repeated after an outside signal, not after a failure of the process itself

@@ -188,7 +188,7 @@ class Supervision:
     def fork_failed(self, name: str, why: str, now_s: float, returncode: int = 1) -> list[Instruction]:
         """Record a failed fork: the system refused a process, or the shared process ended with this code."""
         one = self._all[name]
-        return self._and_wake(self._gone(one, one.failure or why, returncode, now_s))
+        return self._and_wake(self._gone(one, why, returncode, now_s))
 
     def ready(self, name: str) -> list[Instruction]:
         """Record the component's new liveliness token; ignored unless the component is starting."""
@@ -211,18 +211,17 @@ class Supervision:
         one = next((each for each in self if each.pid == pid), None)
         if one is None:
             return []
-        how = one.failure and f"{one.failure}{cause and ': '}{cause}"
-        return self._and_wake(self._gone(one, how or describe(returncode, cause), returncode, now_s))
+        return self._and_wake(self._gone(one, describe(returncode, cause), returncode, now_s, cause))
 
-    def left(self, name: str, returncode: int, how: str, now_s: float) -> list[Instruction]:
+    def left(self, name: str, returncode: int, how: str, now_s: float, cause: str = "") -> list[Instruction]:
         """Record the end of a member of a shared process.
 
         Args:
             returncode: Return code that a process of its own would have had.
             how: How it ended, for people.
+            cause: See ``exited``, of its process.
         """
-        one = self._all[name]
-        return self._and_wake(self._gone(one, one.failure or how, returncode, now_s))
+        return self._and_wake(self._gone(self._all[name], how, returncode, now_s, cause))
 
     def ask_failed(self, name: str, now_s: float) -> list[Instruction]:
         """Record that the request to stop got no answer; SIGTERM follows unless the process is just ending."""
@@ -300,8 +299,9 @@ class Supervision:
         one.silent_s, one.absent_since_s = 0.0, -1.0
         return [ReportReady(one.name, one.pid)]
 
-    def _gone(self, one: Supervised, how: str, returncode: int, now_s: float) -> list[Instruction]:
+    def _gone(self, one: Supervised, how: str, returncode: int, now_s: float, cause: str = "") -> list[Instruction]:
         """Return the instructions after the end of the process."""
+        how = f"{one.failure}{cause and ': '}{cause}" if one.failure else how
         one.pid, one.last_end, one.last_code, one.deadline_s, one.silent_s = 0, how, returncode, NEVER_S, 0.0
         was_answered, is_ordered = one.start_answered, one.end is not None and one.end.ordered
         came_from_outside = returncode <= 0 and one.end is None and not one.is_abandoned

@@ -163,6 +163,17 @@ async def test_a_member_that_blocks_the_event_loop_is_ended_with_its_process_and
     await soon(host, "scout1 is back", is_back)
 
 
+async def test_members_of_a_process_that_hangs_fall_with_the_line_at_which_it_stands(host: CreatorHost) -> None:
+    await join(host, "scout1")
+    await join(host, "blocked", "Blocked")
+
+    async def both_fell() -> bool:
+        return {fell.name for fell in host.fell} == {"scout1", "blocked"}
+
+    await soon(host, "both fell", both_fell)
+    assert all(fell.how.endswith("in never_returns") for fell in host.fell), [fell.how for fell in host.fell]
+
+
 async def test_a_member_that_fails_is_restarted_beside_the_others_and_slowly_from_its_limit_on(
     host: CreatorHost,
 ) -> None:

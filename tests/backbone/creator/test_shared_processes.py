@@ -245,6 +245,11 @@ def test_a_killed_process_takes_everybody_along() -> None:
     assert shared.wanted("scout1", "pool", 6.0) == [ForkProcess("pool", "scout1")]
 
 
+def test_a_process_that_hangs_takes_its_members_along_with_the_place() -> None:
+    place, how = "pan.py, line 7, in update", "its process pool: killed by SIGKILL"
+    assert living("scout1").exited(7, -9, place) == [MemberGone("scout1", -9, how, place)]
+
+
 def test_a_member_is_told_to_end_alone_and_killed_with_its_process() -> None:
     shared = living("scout1", "radio")
     assert shared.signalled("scout1", signal.SIGTERM) == [EndMemberAlone("pool", 7, "scout1", 1)]

@@ -139,7 +139,8 @@ def test_a_first_start_that_a_signal_ended_is_begun_again() -> None:
     assert supervision.ready("scout1") == [ReportReady("scout1", 8)]
 
 
-def test_a_silent_process_is_shown_then_killed_then_restarted() -> None:
+@pytest.mark.parametrize("is_shared", [False, True])
+def test_a_silent_process_is_shown_then_killed_then_restarted(is_shared: bool) -> None:
     supervision = running(RestartPolicy(back_off_s=0.1, hung_after_s=3.0))
     assert supervision.observed("scout1", 0.5, 9.5) == []
     assert supervision.observed("scout1", 0.8, 9.8) == [ReportSilent("scout1", 0.8)]
@@ -147,7 +148,13 @@ def test_a_silent_process_is_shown_then_killed_then_restarted() -> None:
     assert supervision.observed("scout1", 2.9, 11.9) == []
     assert supervision.observed("scout1", 3.0, 12.0) == [SendSignal("scout1", 7, signal.SIGKILL)]
     told = "hung: no sign of life for 3.0 s: pan.py, line 7, in update"
-    assert supervision.exited(7, -9, 12.1, "pan.py, line 7, in update")[0] == ReportFell("scout1", told, 0.1)
+    place = "pan.py, line 7, in update"
+    fell, *_ = (
+        supervision.left("scout1", -9, "its process pool: killed by SIGKILL", 12.1, place)
+        if is_shared
+        else supervision.exited(7, -9, 12.1, place)
+    )
+    assert fell == ReportFell("scout1", told, 0.1)
 
 
 def test_a_beat_of_a_ready_process_searches_no_deadline() -> None:
