@@ -14,7 +14,7 @@ from backbone.component.messages import NameTaken, Stop, Stopping
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal
 from backbone.placer.messages import CreatorSilent, Ended, Start, StopComponent
-from backbone.placer.wishes import Wish, ask_to_start
+from backbone.placer.wishes import Wish, ask_to_start, says_ready
 from resource_pool.messages import ArcState
 
 log = logging.getLogger(__name__)
@@ -82,7 +82,7 @@ class ArcKeeper:
                 asyncio.create_task(self._note_absence(monitor), name=f"{self._arc}:absence"),
             ]
             try:
-                await monitor.wait_gone()
+                await self._wait_gone(monitor)
             finally:
                 monitor.close()
                 for task in watching:
@@ -133,6 +133,14 @@ class ArcKeeper:
                 await self._bus.ask(self._client.address, Stop("left from before"), Stopping, within_s=REPLY_TIME_S)
         except LinkError as error:
             log.info("%s: ended without an answer: %s", self._arc, error)
+
+    async def _wait_gone(self, monitor: PeerMonitor) -> None:
+        """Return when the ARC's token is missing and the ARC does not answer: a token alone may be lost for good."""
+        await monitor.wait_gone()
+        while await says_ready(self._bus, self._client.address):
+            self._wish.ready()
+            self._on_changed()
+            await monitor.wait_gone()
 
     async def _note_absence(self, monitor: PeerMonitor) -> None:
         """Report the ARC as absent while its token is missing, even if only this component's own link may be down."""

@@ -8,7 +8,8 @@ from typing import Any
 from backbone.addresses import PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.messages import NameTaken
+from backbone.component.messages import AskState, ComponentState, LifeState, NameTaken
+from backbone.component.peer_monitor import GONE_AFTER_S
 from backbone.placer.messages import Ended, Start, Started, StopComponent
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import ArcClient, Resumed, Suspended, Suspending
@@ -31,6 +32,7 @@ class PlayedPlacer:
     """Starts the ARC, which is a token, unless one from before has its name; that one takes long to end."""
 
     def __init__(self, network: LocalNetwork, *, leftover: bool = False, takes_s: float = 0.0) -> None:
+        self.starts = 0
         self.bus, self.arc, self.leftover = network.join(PLACER, CLOCK), network.join(ARC, CLOCK), leftover
         self.takes_s = takes_s
         self.bus.serve(PLACER, Start | StopComponent, self.answer)
@@ -40,6 +42,7 @@ class PlayedPlacer:
             await CLOCK.sleep_s(20.0)
             self.leftover = False
             return Ended(asked.body.name, "asking")  # type: ignore[arg-type]
+        self.starts += 1
         if self.leftover:
             raise NameTaken("it is starting")
         await CLOCK.sleep_s(self.takes_s)
@@ -61,6 +64,33 @@ def test_an_arc_is_missed_while_it_cannot_be_reached() -> None:
         placer.token = placer.arc.declare_alive(ARC)
         await CLOCK.sleep_s(0.1)
         assert arc.wish.absence() is None
+        await _end(keeping, bus, placer.bus, placer.arc)
+
+    run_virtual(main())
+
+
+def test_an_arc_that_answers_is_there_though_its_token_is_lost_for_good() -> None:
+    """The placer had it, so the owner ended it as one from before, in the middle of its grant."""
+
+    async def main() -> None:
+        network = LocalNetwork()
+        placer, bus = PlayedPlacer(network), network.join("mission_control/owner", CLOCK)
+        arc = ArcClient(bus, "owner-drive", Owner())
+
+        async def answer(_asked: Envelope[AskState]) -> Message:
+            return ComponentState(ARC, "drive", "h1", 1, LifeState.READY, 0.0)
+
+        serving = placer.arc.serve(ARC, AskState, answer)
+        keeping = asyncio.create_task(arc.keep(CLOCK, "drive", {}))
+        await CLOCK.sleep_s(1.0)
+        placer.token.close()
+        await CLOCK.sleep_s(GONE_AFTER_S)
+        for _ in range(10):
+            await CLOCK.sleep_s(1.0)
+            assert (arc.wish.absence(), placer.starts) == (None, 1)
+        serving.close()
+        await CLOCK.sleep_s(3.0)
+        assert placer.starts == 2
         await _end(keeping, bus, placer.bus, placer.arc)
 
     run_virtual(main())
