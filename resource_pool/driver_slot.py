@@ -26,7 +26,19 @@ HANGS_S = 0.2  # chosen: the old driver still has as long until the RC itself gi
 Judge = Callable[[str, object], object]
 """Name of a method, and what it returned → what the RC uses; raises ``HardwareFault`` if the RC cannot use it."""
 
+Again = Callable[[str], None]
+"""Name of a method whose failed call is to be repeated; raises a ``Refusal`` if the call has become pointless."""
+
 SLOTS_KEPT = 64  # chosen: more than the kinds of drivers in one process
+
+
+def as_returned(_method: str, returned: object) -> object:
+    """Use what a driver returns as it is."""
+    return returned
+
+
+def always(_method: str) -> None:
+    """Repeat every failed call."""
 
 
 class DriverSlot:
@@ -42,15 +54,16 @@ class DriverSlot:
         has_device: False: no device is open, until the gate is opened.
     """
 
-    def __init__(self, driver: object, judge: Judge, fail: Callable[[BaseException], None]) -> None:
+    def __init__(self, driver: object, judge: Judge, again: Again, fail: Callable[[BaseException], None]) -> None:
         """Pass calls to this driver.
 
         Args:
             driver: The driver.
             judge: Reads what its methods return.
+            again: Called before the old driver repeats an asynchronous call, because time has passed since.
             fail: Called with the hardware fault if a driver that is not on trial delivers a value of no use.
         """
-        self._judge, self._fail = judge, fail
+        self._judge, self._again, self._fail = judge, again, fail
         self.proxy: Any = _proxy_class(type(driver))(self)  # type: ignore[arg-type]  # mypy: classes have no hash
         self.works = driver
         self.on_trial: Callable[[BaseException], asyncio.Event | None] = lambda _error: None
@@ -127,6 +140,7 @@ class DriverSlot:
                 self._quiet.set()
         if back is not None:
             await back.wait()
+        self._again(name)
         return await self.call_later(name, arguments, named)
 
     def _while_works(self, driver: object, given: object) -> object:

@@ -45,7 +45,7 @@ from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of
 from resource_pool.commands import OF_THE_BASE, Command
 from resource_pool.driver_adjusting import adjust_all
 from resource_pool.driver_exchange import DriverExchanges
-from resource_pool.driver_slot import DriverSlot, Judge
+from resource_pool.driver_slot import Again, DriverSlot, Judge, always, as_returned
 from resource_pool.drivers.interface import (
     DriverSite,
     HardwareFault,
@@ -202,10 +202,10 @@ class ResourceController(Component[R], Generic[R]):
             self._ends.remark,
         )
 
-    def make_driver(self, name: str = "", judge: Judge = lambda _method, returned: returned) -> Any:
+    def make_driver(self, name: str = "", judge: Judge = as_returned, again: Again = always) -> Any:
         """Return a driver for this RC, not open yet: the named driver, or by default the one in the mission file.
 
-        ``judge`` reads what the driver's methods return.
+        ``judge`` reads what the driver's methods return; ``again`` may refuse to repeat a call with the old driver.
 
         Raises:
             UnknownDriver: No driver has this name.
@@ -213,7 +213,7 @@ class ResourceController(Component[R], Generic[R]):
         """
         named = name or self.parameters.driver
         build = partial(build_driver, self.driver_kind, named, protocol=self.driver_protocol)
-        slot = DriverSlot(self._exchanges.made(build, self.driver_site()), judge, self.fail)
+        slot = DriverSlot(self._exchanges.made(build, self.driver_site()), judge, again, self.fail)
         self._slots.append(slot)
         return slot.proxy
 

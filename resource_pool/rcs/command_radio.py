@@ -75,12 +75,13 @@ class CommandRadio(ResourceController[RcParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._driver: RadioDriver = self.make_driver(judge=self._credible)
+        self._driver: RadioDriver = self.make_driver(judge=self._credible, again=self._is_still_wanted)
         self._schedule = PacketSchedule()
         self._slow = SlowPackets(EVERY_S * max(1.0, clock.rate))
         self._owed: deque[Sending] = deque()
         self._air = asyncio.Lock()
         self._air_free_s = 0.0
+        self._in_the_air: Packet | None = None
         self._loaded = asyncio.Event()
         self._tickets = itertools.count(1)
         self._waiting: dict[int, _Once] = {}
@@ -280,14 +281,14 @@ class CommandRadio(ResourceController[RcParameters]):
 
         Raises:
             HardwareFault: The radio did not send the packet, or its driver reports an impossible time on the air.
-            GivenBeforeStop: The robot was stopped while the packet waited for the air; it was not sent.
+            GivenBeforeStop: The robot was stopped while the packet waited for the air or a driver; it was not sent.
         """
         await self.clock.sleep_until_s(self._air_free_s)
         if self._schedule.is_overtaken(sending.packet):
             raise self._overtaken(sending.packet)
         begun_s = self.clock.now_s()
         self._air_free_s = begun_s + sending.air_time_s
-        packet = sending.packet
+        packet = self._in_the_air = sending.packet
         try:
             async with asyncio.timeout(TRANSMIT_WITHIN_S):
                 reported_s = await self._driver.transmit(
@@ -309,6 +310,11 @@ class CommandRadio(ResourceController[RcParameters]):
         for news in self._schedule.sent(sending, begun_s, took_s):
             log.warning("%s: %s", packet.arc, news)
             self.publish_event(packet.arc, f"on {self.name}: {news}")
+
+    def _is_still_wanted(self, _method: str) -> None:
+        """Refuse to repeat a packet whose robot was stopped while the new driver failed."""
+        if self._in_the_air is not None and self._schedule.is_overtaken(self._in_the_air):
+            raise self._overtaken(self._in_the_air)
 
     def _credible(self, method: str, returned: object) -> object:
         """Refuse a time on the air that is no number or would block the air for no real reason."""

@@ -12,7 +12,7 @@ from pool_orders import at, connect
 
 from backbone.bus.clock import run_virtual
 from resource_pool.commands import Command
-from resource_pool.driver_slot import DriverSlot
+from resource_pool.driver_slot import DriverSlot, always, as_returned
 from resource_pool.drivers.interface import DriverSite
 from resource_pool.holds import Hold
 from resource_pool.messages import Applied
@@ -23,7 +23,7 @@ def slot_of(driver: object) -> DriverSlot:
     def fail(fault: BaseException) -> None:
         raise fault
 
-    return DriverSlot(driver, lambda _method, returned: returned, fail)
+    return DriverSlot(driver, as_returned, always, fail)
 
 
 OWN_NAMES = sorted(name for name in vars(slot_of(object())).keys() | vars(DriverSlot) if not name.startswith("_"))

@@ -17,10 +17,12 @@ from backbone.dependency_database.messages import Resource
 from backbone.exchange import SwapClass, Swapped
 from backbone.rc_manager.messages import Connect, Connected
 from backbone.scheduling.requests import RcUse
+from resource_pool.arc_client import stop_robot
 from resource_pool.commands import Drive, Tune
 from resource_pool.drivers.interface import Picture
 from resource_pool.drivers.simulated import SimulatedScoutProtocol
 from resource_pool.messages import Applied
+from scout_model.radio_link import encode_halt
 
 HERE = "test_wrong_values_of_new_drivers"
 WRONG_TIMES = {"nan": float("nan"), "endless": float("inf"), "before": -1.0, "long": 11.0, "none": "soon"}
@@ -120,5 +122,32 @@ def test_a_packet_that_is_not_of_bytes_brings_the_old_protocol_back(local_missio
             swapped = await swapping
             assert not swapped.is_proved
             assert pool.is_alive("scout1")
+
+    run_virtual(main())
+
+
+class HangingRadio(WiretappedRadio):
+    """Accepts no packet."""
+
+    async def transmit(self, *packet: Any, **of: Any) -> Any:
+        await asyncio.Event().wait()
+
+
+def test_a_packet_that_a_new_radio_did_not_send_is_not_sent_by_the_old_one_after_a_stop(local_mission: Any) -> None:
+    """Otherwise a robot that stands drives again for a moment, after its stop was confirmed."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+            await pool.clock.sleep_s(0.1)
+            swapping = asyncio.create_task(swap(pool, "HangingRadio", at="radio"))
+            await pool.clock.sleep_s(0.1)
+            await stop_robot(pool.voice_of("ui_console/console-1"), "scout1", "a child", "anna")
+            stopped_s = pool.clock.now_s()
+            assert not (await swapping).is_proved
+            await pool.clock.sleep_s(0.5)
+            afterwards = [packet.payload for packet in WiretappedRadio.built[0].heard if packet.at_s > stopped_s]
+            assert set(afterwards) == {encode_halt()}
 
     run_virtual(main())
