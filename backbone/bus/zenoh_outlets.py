@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from typing import Any, cast
@@ -13,6 +15,11 @@ from backbone.keys import Conversation, key, key_of_sender
 from backbone.quality import EACH_ON_HOST, OF_ANY_SIZE, Quality, Urgency
 from backbone.wire import Envelope, Message, refuse_oversized, write
 
+log = logging.getLogger(__name__)
+
+MISSED_AFTER_S = (
+    2.0  # chosen: a listener of this host finds the board within milliseconds, on a busy machine in a second
+)
 MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
 KNOWN_AFTER_S = 1.0  # chosen: a new publisher knows its subscribers by then; it takes milliseconds
 
@@ -59,6 +66,7 @@ class Outlet:
         self._declare_token = declare_token
         self._token = declare_token() if quality.most_bytes_on_host else None
         self._is_matched = False
+        self._missed_since_s, self._has_told = math.inf, False
         self._matching = self._watch_matching() if board is not None else None
 
     def is_heard(self, now_s: float) -> bool:
@@ -113,11 +121,23 @@ class Outlet:
         if len(raw) > self.quality.most_bytes:
             if not board.is_open:
                 refuse_oversized(len(raw), self.quality.most_bytes, type(envelope.body).__name__)
+            self._watch_missed(len(raw), now_s)
             return
         if is_heard:
             self.publisher.put(raw)
         for send in apart:
             send(raw)
+
+    def _watch_missed(self, length: int, now_s: float) -> None:
+        """Log once that a subscriber that does not read the board misses the values, which are too long for it."""
+        if not self._is_matched:
+            self._missed_since_s = math.inf
+        elif self._missed_since_s == math.inf:
+            self._missed_since_s = now_s
+        elif not self._has_told and now_s - self._missed_since_s >= MISSED_AFTER_S:
+            self._has_told = True
+            limit = self.quality.most_bytes
+            log.warning("%s: subscribers on other hosts miss %d bytes, %d fit the network", self.key, length, limit)
 
     def _raise_token(self) -> None:
         """Declare the token again, so that listeners find the board that was opened."""

@@ -31,7 +31,7 @@ from hosts_with_boards import (
 from backbone.bus.host_boards import LARGE_BYTES, boards_for
 from backbone.bus.shared_bus import SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
-from backbone.bus.zenoh_outlets import MOST_PUBLISHERS
+from backbone.bus.zenoh_outlets import MISSED_AFTER_S, MOST_PUBLISHERS
 from backbone.keys import Conversation
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, WIRE_VERSION, Envelope, OversizedMessage
 
@@ -230,6 +230,30 @@ async def test_a_large_output_reaches_this_host_and_a_longer_one_is_refused(fold
             far.publish(AT, Conversation.OUTPUTS, picture(8, size))
         with pytest.raises(OversizedMessage):
             sender.publish(AT, Conversation.EVENTS, picture(8, size))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_far_there", [True, False])
+async def test_a_log_says_that_another_host_misses_values_that_are_too_long_for_the_network(
+    folder: Path, caplog: pytest.LogCaptureFixture, is_far_there: bool
+) -> None:
+    """Otherwise a module there waits for ever, and nothing says why."""
+    async with host(folder) as near:
+        sender, listener, far = near.join(SERVER), near.join(ASKER), near.join(THIRD, is_near=False)
+        heard, missed = Heard(), Heard()
+        listener.subscribe(AT, Conversation.OUTPUTS, Map, heard, latest=True)
+        await until_known(listener, sender)
+        if is_far_there:
+            far.subscribe(AT, Conversation.OUTPUTS, Map, missed, latest=True)
+            await until_known(far, sender)
+        ends_s = CLOCK.now_s() + 2 * MISSED_AFTER_S
+        while CLOCK.now_s() < ends_s:
+            sender.publish(AT, Conversation.OUTPUTS, picture(7, 2 * MAX_MESSAGE_BYTES))
+            await asyncio.sleep(0.1)
+        assert heard.all
+        assert not missed.all
+        told = [one for one in caplog.records if "subscribers on other hosts miss" in one.getMessage()]
+        assert len(told) == is_far_there
 
 
 async def test_neighbors_get_the_object_and_other_processes_the_board(folder: Path, network: list[int]) -> None:
