@@ -143,9 +143,14 @@ class ContextSwitch:
                 left.pop(hold, None)
         return True
 
-    async def disconnect(self, holds: Sequence[Hold], reason: str) -> None:
-        """Disconnect all at once; wait until each RC confirms or its lease is over."""
-        await self._disconnect(holds, reason, math.inf)
+    async def end_orphans(self, holds: Sequence[Hold]) -> list[str]:
+        """Disconnect these holds of before a restart, all at once.
+
+        Returns:
+            RCs that did not confirm within ``RC_REPLY_S``: the caller calls ``clear`` before they count as up.
+        """
+        free_by_s = self._clock.now_s() + RC_REPLY_S * self._clock.rate
+        return await self._disconnect(holds, "not adopted after a restart", free_by_s)
 
     async def _connect_rcs(self, order: ConnectArc) -> str | None:
         """Connect all RCs at once; return the name of one that failed, or None."""

@@ -19,7 +19,7 @@ from backbone.component.story import StoryBook
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
 from backbone.placer.messages import Start, Started
-from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch, in_pool
+from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch, Hold, in_pool
 from backbone.rc_manager.credibility import contradiction
 from backbone.rc_manager.failures import Failures
 from backbone.rc_manager.messages import AskRc, RcState
@@ -213,11 +213,19 @@ class RcWatch:
             return False
         return True
 
-    def believed(self, found: Found) -> Found:
-        """Return the findings without the RCs that are not credible; they are checked once this manager serves."""
+    async def cleared(self, found: Found) -> Found:
+        """End the holds that no ARC has rightly; return what can be taken over.
+
+        RCs that are not credible, or do not confirm the end, are left out and checked once this manager serves. Nobody
+        waits for them, because no lease is renewed until then.
+        """
         now_s = self._service.clock.now_s()
-        believed = {rc: s for rc, s in found.rcs.items() if not contradiction(s, self.resources[rc], now_s)}
-        return Found(believed, found.arcs)
+        found = found.without([rc for rc, s in found.rcs.items() if contradiction(s, self.resources[rc], now_s)])
+        ended: set[Hold] = set()
+        while holds := [hold for hold in found.orphans() if hold not in ended]:
+            ended.update(holds)
+            found = found.without(await self._context_switch.end_orphans(holds))
+        return found
 
     async def _start(self, resource: Resource) -> None:
         service, rc = self._service, resource.name

@@ -61,6 +61,10 @@ class Found:
             if not self.holds_rightly(holder.arc)
         ]
 
+    def without(self, rcs: Collection[str]) -> Found:
+        """Return the findings without these RCs."""
+        return Found({rc: state for rc, state in self.rcs.items() if rc not in rcs}, self.arcs)
+
     def adopted(self, resources: Mapping[str, Resource], now_s: float) -> list[tuple[float, Adopted]]:
         """Return the time of connection of each ARC with confirmed holds, in the order of these times."""
         found = []

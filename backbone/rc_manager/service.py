@@ -125,8 +125,7 @@ class RcManager(Component[RcManagerParameters]):
         """Read the hardware and, after a restart, its holders; then watch the nameserver for changes."""
         self._log.begin(self.parameters.trace)
         await self._hardware.learn()
-        self._found = self._rcs.believed(await self._recovery.find(self._resources))
-        await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
+        self._found = await self._rcs.cleared(await self._recovery.find(self._resources))
 
     async def serve(self) -> None:
         """Take over the findings; then wake when a decision is due, renew leases, publish changes."""
