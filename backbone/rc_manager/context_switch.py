@@ -21,9 +21,10 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
-from backbone.naming import Subsystem
+from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.failures import Failures, Note
 from backbone.rc_manager.messages import (
     CloseGate,
@@ -143,14 +144,19 @@ class ContextSwitch:
                 left.pop(hold, None)
         return True
 
-    async def end_orphans(self, holds: Sequence[Hold]) -> list[str]:
-        """Disconnect these holds of before a restart, all at once.
+    async def end_orphans(self, holds: Sequence[Hold], arcs: Sequence[str]) -> list[str]:
+        """Disconnect these holds of before a restart, and close the gates of these ARCs, all at once.
 
         Returns:
             RCs that did not confirm within ``RC_REPLY_S``: the caller calls ``clear`` before they count as up.
         """
+        close = CloseGate("lease", component_of(RC_MANAGER), 0.0, -1.0)
         free_by_s = self._clock.now_s() + RC_REPLY_S * self._clock.rate
-        return await self._disconnect(holds, "not adopted after a restart", free_by_s)
+        async with asyncio.TaskGroup() as both:
+            for arc in arcs:
+                both.create_task(self._close_gate(arc, close))
+            disconnecting = both.create_task(self._disconnect(holds, "not adopted after a restart", free_by_s))
+        return disconnecting.result()
 
     async def _connect_rcs(self, order: ConnectArc) -> str | None:
         """Connect all RCs at once; return the name of one that failed, or None."""

@@ -214,7 +214,7 @@ class RcWatch:
         return True
 
     async def cleared(self, found: Found) -> Found:
-        """End the holds that no ARC has rightly; return what can be taken over.
+        """End the holds that no ARC has rightly, and close those ARCs' gates; return what can be taken over.
 
         RCs that are not credible, or do not confirm the end, are left out and checked once this manager serves. Nobody
         waits for them, because no lease is renewed until then.
@@ -222,10 +222,15 @@ class RcWatch:
         now_s = self._service.clock.now_s()
         found = found.without([rc for rc, s in found.rcs.items() if contradiction(s, self.resources[rc], now_s)])
         ended: set[Hold] = set()
-        while holds := [hold for hold in found.orphans() if hold not in ended]:
+        closed: set[str] = set()
+        while True:
+            holds = [hold for hold in found.orphans() if hold not in ended]
+            gates = [arc for arc in found.strays() if arc not in closed]
+            if not (holds or gates):
+                return found
             ended.update(holds)
-            found = found.without(await self._context_switch.end_orphans(holds))
-        return found
+            closed.update(gates)
+            found = found.without(await self._context_switch.end_orphans(holds, gates))
 
     async def _start(self, resource: Resource) -> None:
         service, rc = self._service, resource.name

@@ -61,6 +61,12 @@ class Found:
             if not self.holds_rightly(holder.arc)
         ]
 
+    def strays(self) -> list[str]:
+        """Return the ARCs whose gates may be open, or about to open, although their holds are not all confirmed."""
+        held = [arc for _, arc, _ in self.orphans()]
+        believing = [arc for arc, current in self.arcs.items() if current.epochs and not self.holds_rightly(arc)]
+        return [*dict.fromkeys([*held, *believing])]
+
     def without(self, rcs: Collection[str]) -> Found:
         """Return the findings without these RCs."""
         return Found({rc: state for rc, state in self.rcs.items() if rc not in rcs}, self.arcs)

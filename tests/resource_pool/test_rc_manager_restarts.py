@@ -7,13 +7,18 @@ from typing import Any, cast
 
 import pytest
 from pool_on_local_network import Pool, a_pool
+from pool_orders import state_of
 
 from backbone.bus.clock import run_virtual
+from backbone.dependency_database.messages import Resource
+from backbone.errors import Refusal
 from backbone.rc_manager.messages import Disconnect
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.holds import Hold
 from resource_pool.rcs.skeleton import Lamp
+
+PAINTED = "resource_pool.rcs.skeleton:PaintedLamp"
 
 
 class StuckLamp(Lamp):
@@ -60,5 +65,45 @@ def test_an_rc_that_keeps_the_hold_of_a_dead_arc_costs_nobody_else_a_grant(local
             lit = await pool.arc(again, "lit_drive", "scout2")
             await pool.clock.sleep_s(2.0)
             assert lit.granted is not None, "the lamp counts as up again as soon as it obeys"
+
+    run_virtual(main())
+
+
+def test_the_gate_of_an_arc_whose_rcs_were_settling_stays_shut_where_another_gets_them(local_mission: Any) -> None:
+    async def main() -> None:
+        slow = Resource("slow", "lamp", connect_s=1.5, driver=PAINTED, parameters={"color": "green"})
+        async with a_pool(local_mission, ["scout1", "radio", "slow"], hardware=[slow]) as pool:
+            console, preferred = await pool.console("console", "drive", "scout1", idle=True)
+            owner = await pool.owner("owner")
+            settling = await pool.arc(owner, "lit_drive", "scout1")
+            await pool.clock.sleep_s(0.4)
+            assert set((await state_of(pool, "slow")).holders), "it settles for the ARC"
+            await pool.kill("rc_manager")
+            with pytest.raises(Refusal, match="no answer"):
+                await preferred.idle(False)
+            await restart_the_rc_manager(pool, 0.1)
+            await pool.clock.sleep_s(4.0)
+            assert console.heard() == ["Resumed"]
+            assert owner.heard() == []
+            assert not (await settling.state()).granted
+
+    run_virtual(main())
+
+
+def test_an_owner_hears_at_once_that_the_rc_manager_restarted_with_an_rc_of_its_set(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"]) as pool:
+            owner = await pool.owner("owner")
+            arc = await pool.arc(owner, "drive", "scout1")
+            await arc.wait_granted()
+            for name in ("rc_manager", "radio"):
+                await pool.kill(name)
+            await pool.clock.sleep_s(0.3)
+            await pool.manager()
+            await pool.clock.sleep_s(0.1)
+            assert owner.heard() == ["Resumed", "Suspended"]
+            await pool.rc("radio")
+            await pool.clock.sleep_s(1.0)
+            assert owner.heard() == ["Resumed", "Suspended", "Resumed"]
 
     run_virtual(main())
