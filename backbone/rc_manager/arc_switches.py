@@ -61,14 +61,14 @@ class ArcSwitches:
 
     def connect(self, order: ConnectArc) -> None:
         """Connect the ARC to its RCs."""
-        self.begin(order.arc, lambda: self._connect(order))
+        self._begin(order.arc, lambda: self._connect(order))
 
     def revoke(self, order: RevokeArc) -> None:
         """Take the RCs from the ARC."""
         self._times.revoked(order.epochs, order.arc, self._service.clock.now_s())
-        self.begin(order.arc, lambda: self._revoke(order))
+        self._begin(order.arc, lambda: self._revoke(order))
 
-    def begin(self, arc: str, work: Callable[[], Coroutine[object, None, None]]) -> None:
+    def _begin(self, arc: str, work: Callable[[], Coroutine[object, None, None]]) -> None:
         """Run the work after ending the work that still runs for this ARC."""
         before = self._under_way.get(arc)
 

@@ -90,6 +90,7 @@ class ArcWatch:
         self._service, self._failures, self._switches, self._recovery = service, failures, switches, recovery
         self._beats = Beats(service.clock.rate)
         self._requesting: defaultdict[str, list[Choosing]] = defaultdict(list)
+        self._meeting: set[str] = set()
 
     def require_sender(self, asked: Envelope[Message]) -> None:
         """Check that a request of an ARC, or a change of it, comes from this ARC.
@@ -170,11 +171,21 @@ class ArcWatch:
             return
         if arc in self._beats.heard_s:
             self._beats.heard(arc, self._service.clock.now_s())
-        elif arc not in self._switches and arc not in self._requesting:
-            self._switches.begin(arc, lambda: self._meet(arc))
+        elif arc not in self._switches and arc not in self._requesting and arc not in self._meeting:
+            self._meeting.add(arc)
+            self._service.start_task(self._meet(arc), f"meet {arc}")
 
     async def _meet(self, arc: str) -> None:
-        """Readmit an ARC that beats but is unknown: it hung, or its request was lost with an earlier manager."""
+        """Readmit an ARC that beats but is unknown: it hung, or its request was lost with an earlier manager.
+
+        This is no switch: a connection that waits for it could be overtaken by one with a later epoch.
+        """
+        try:
+            await self._ask_for_its_request(arc)
+        finally:
+            self._meeting.discard(arc)
+
+    async def _ask_for_its_request(self, arc: str) -> None:
         current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
         is_known = arc in self._beats.heard_s or arc in self._requesting
         if current is None or is_known or self._service.admit_again(current):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from itertools import pairwise
 from pathlib import Path
@@ -212,3 +213,24 @@ def test_a_schedule_that_nobody_hears_is_not_worked_out_and_a_new_listener_soon_
             assert [view.arc for view in heard[0].requests] == ["one"]
 
     run_virtual(main())
+
+
+def test_two_arcs_of_a_radio_connect_in_the_order_of_their_epochs_even_if_one_is_being_asked(pool: Any) -> None:
+    """It beat before its request came, so the RC manager is asking it for its request."""
+
+    async def main() -> Path:
+        async with pool() as here, here.beside(here.manager()):
+            late, other = await here.arc("late"), await here.arc("other")
+            await here.clock.sleep_s(0.5)
+            late.hangs = True
+            await here.clock.sleep_s(0.3)
+            late.hangs = False
+            await asyncio.gather(
+                late.ask_for(request("late", "left", "radio")), other.ask_for(request("other", "right", "radio"))
+            )
+            await here.clock.sleep_s(0.5)
+            assert (late.is_open, other.is_open) == (True, True)
+            return here.trace  # type: ignore[no-any-return]
+
+    lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
+    assert not [line for line in lines if line["ev"] in ("rc_state", "revoke")]
