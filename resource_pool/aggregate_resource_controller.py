@@ -238,6 +238,7 @@ class AggregateResourceController(Component[ArcParameters]):
         return {self.body if role == ROBOT and self.body else role: value for role, value in wanted.items()}
 
     def _set_parameters(self, changed: Mapping[str, object]) -> None:
+        self._manager_watch.request_changed()
         self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)
 
     def statistics(self) -> dict[str, float]:

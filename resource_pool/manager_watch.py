@@ -33,8 +33,12 @@ class ManagerWatch:
         """Record that the RC manager asked for the ARC's request."""
         self._asked.set()
 
+    def request_changed(self) -> None:
+        """Record a change of the request: an RC manager that has asked before, and still starts, may not get it."""
+        self._asked.clear()
+
     async def watch(self, send_request: Callable[[], Awaitable[None]]) -> None:
-        """Send the request again if a restarted RC manager has not asked for it."""
+        """Send the request again if a restarted RC manager has not asked for it since its last change."""
         manager = self._manager = PeerMonitor(self._bus, RC_MANAGER)
         try:
             await manager.wait_there()

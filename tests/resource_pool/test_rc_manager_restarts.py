@@ -12,8 +12,9 @@ from pool_orders import state_of
 from backbone.bus.clock import run_virtual
 from backbone.dependency_database.messages import Resource
 from backbone.errors import Refusal
-from backbone.rc_manager.messages import Disconnect
+from backbone.rc_manager.messages import AskRequest, Disconnect
 from backbone.wire import Envelope, Message
+from resource_pool.arcs.drive import DriveArc
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.holds import Hold
 from resource_pool.rcs.skeleton import Lamp
@@ -33,6 +34,15 @@ class StuckLamp(Lamp):
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         if self.is_stuck and self.hangs and isinstance(asked.body, Disconnect):
+            await asyncio.Event().wait()
+        return await super().answer(asked)
+
+
+class HungDrive(DriveArc):
+    """An ARC that does not answer a restarted RC manager."""
+
+    async def answer(self, asked: Envelope[Message]) -> Message:
+        if isinstance(asked.body, AskRequest):
             await asyncio.Event().wait()
         return await super().answer(asked)
 
@@ -105,5 +115,27 @@ def test_an_owner_hears_at_once_that_the_rc_manager_restarted_with_an_rc_of_its_
             await pool.rc("radio")
             await pool.clock.sleep_s(1.0)
             assert owner.heard() == ["Resumed", "Suspended", "Resumed"]
+
+    run_virtual(main())
+
+
+def test_a_wish_amid_the_start_of_an_rc_manager_that_has_asked_already_reaches_it(local_mission: Any) -> None:
+    """Another ARC hangs, so the RC manager is still asking when this one's owner wants time."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "scout2", "radio"], arc_classes={"capture": HungDrive}) as pool:
+            owner, other = await pool.owner("owner"), await pool.owner("other")
+            arc = await pool.arc(owner, "drive", "scout1", idle=True)
+            await (await pool.arc(other, "capture", "scout2")).wait_granted()
+            await pool.kill("rc_manager")
+            await pool.clock.sleep_s(0.2)
+            starting = asyncio.create_task(pool.manager())
+            await pool.clock.sleep_s(0.2)
+            assert not starting.done()
+            with pytest.raises(Refusal, match="no answer"):
+                await arc.idle(False)
+            await starting
+            await pool.clock.sleep_s(2.0)
+            assert owner.heard() == ["Resumed"]
 
     run_virtual(main())
