@@ -74,23 +74,26 @@ class PlacedRequest:
         return self.rcs.get(role, "")
 
     async def send(self) -> Scheduled:
-        """Send the request and return its place.
+        """Send the request, again if it was changed meanwhile, and return its place.
 
         Raises:
             Refusal: The RC manager refused the request.
             LinkError: The RC manager did not answer.
         """
-        request = self.request
-        assert request is not None  # noqa: S101  made in connect
-        return await ask_until_answered(
-            self._bus,
-            self._clock,
-            RC_MANAGER,
-            request,
-            Scheduled,
-            each_s=REQUEST_EACH_S,
-            within_s=REQUEST_WITHIN_S,
-        )
+        while True:
+            request = self.request
+            assert request is not None  # noqa: S101  made in connect
+            scheduled = await ask_until_answered(
+                self._bus,
+                self._clock,
+                RC_MANAGER,
+                request,
+                Scheduled,
+                each_s=REQUEST_EACH_S,
+                within_s=REQUEST_WITHIN_S,
+            )
+            if request == self.request:
+                return scheduled
 
     async def withdraw_all(self) -> bool:
         """Withdraw the holds that the RC manager has on record; return False if it is gone: the next one asks."""

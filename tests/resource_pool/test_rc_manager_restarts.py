@@ -139,3 +139,18 @@ def test_a_wish_amid_the_start_of_an_rc_manager_that_has_asked_already_reaches_i
             assert owner.heard() == ["Resumed"]
 
     run_virtual(main())
+
+
+def test_a_wish_while_the_first_request_finds_no_rc_manager_counts_at_the_next_one(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            owner = await pool.owner("owner")
+            arc = await pool.arc(owner, "drive", "scout1")
+            await pool.clock.sleep_s(0.5)
+            with pytest.raises(Refusal, match="no answer"):
+                await arc.idle()
+            await pool.manager()
+            await pool.clock.sleep_s(1.0)
+            assert owner.heard()[-1:] != ["Resumed"]
+
+    run_virtual(main())
