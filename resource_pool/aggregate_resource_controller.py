@@ -63,13 +63,12 @@ from resource_pool.messages import (
 )
 from resource_pool.owner_notices import OwnerNotices
 from resource_pool.owner_watch import OwnerWatch
-from resource_pool.placed_request import PlacedRequest
+from resource_pool.placed_request import RUN_TIMES, PlacedRequest
 from resource_pool.set_lease import SetLease
 
 W = TypeVar("W")
 
 PREPARE_S = 0.9  # chosen: less than the RC manager's limit for the opening, so the gate opens in time or never
-RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # parameters that may change while it runs
 
 
 class AggregateResourceController(Component[ArcParameters]):

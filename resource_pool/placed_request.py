@@ -22,6 +22,7 @@ from resource_pool.arc_slice import RC_REPLY_S
 log = logging.getLogger(__name__)
 
 REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first ask for the start of RCs
+RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # parameters that may change while an ARC runs
 
 
 class PlacedRequest:
@@ -167,7 +168,7 @@ class PlacedRequest:
     def ask_by(self, changed: Mapping[str, bool | float]) -> None:
         """Change request and parameters together, so that the parameters show the present request."""
         assert self.request is not None  # noqa: S101  made in connect
-        if self.sending is not None:
+        if self.sending is not None and not RUN_TIMES.isdisjoint(changed):
             self.sending.cancel()  # the run times under way are outdated
         self.request = msgspec.structs.replace(self.request, **changed)
         self._changed(changed)

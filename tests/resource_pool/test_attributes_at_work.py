@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -13,7 +14,7 @@ from pool_on_local_network import Owner, Pool, a_pool
 from backbone.addresses import LAUNCHER, RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.command_line.attributes import WrongAttribute, attributes_of, change
-from backbone.component.messages import WrongParameter
+from backbone.component.messages import Parameters, SetParameter, WrongParameter
 from backbone.keys import Conversation
 from backbone.launcher.messages import AskTree, Tree
 from backbone.nameserver.messages import UnknownName
@@ -111,6 +112,16 @@ def test_a_moved_subtree_takes_turns_with_its_new_siblings(play: Any) -> None:
         assert low.heard() == ["Resumed"]
         await pool.clock.sleep_s(6.0)
         assert high.heard()[-1] == "Resumed"
+
+    play(scene)
+
+
+def test_a_changed_run_time_counts_even_if_the_owner_wants_no_time_at_the_same_moment(play: Any) -> None:
+    async def scene(pool: Pool, high: Owner, low: Owner) -> None:
+        arc, shorter = low.arcs["low-drive"], SetParameter("minimum_runtime_s", 3.0)
+        await asyncio.gather(pool.ear.ask(arc.address, shorter, Parameters, within_s=1), arc.idle())
+        await pool.clock.sleep_s(0.5)
+        assert (await attributes_of(pool.ear, "low")).requests[0].minimum_runtime_s == 3.0
 
     play(scene)
 
