@@ -65,7 +65,7 @@ class ArcSwitches:
 
     def revoke(self, order: RevokeArc) -> None:
         """Take the RCs from the ARC."""
-        self._times.revoked(order.epochs, order.arc, self._service.clock.now_s())
+        self._times.revoked(order.epochs, order.by, self._service.clock.now_s())
         self._begin(order.arc, lambda: self._revoke(order))
 
     def _begin(self, arc: str, work: Callable[[], Coroutine[object, None, None]]) -> None:

@@ -13,19 +13,19 @@ class SwitchTimes:
 
     def __init__(self) -> None:
         """Begin without switches."""
-        self._revoked: dict[str, tuple[float, str]] = {}  # RC → time and ARC of the revocation
+        self._revoked: dict[str, tuple[float, str]] = {}  # RC → time of its revocation, and for which ARC
         self._times_s: deque[float] = deque(maxlen=KEPT)
 
-    def revoked(self, rcs: Iterable[str], arc: str, now_s: float) -> None:
-        """Record that these RCs are being revoked from an ARC."""
-        self._revoked |= dict.fromkeys(rcs, (now_s, arc))
+    def revoked(self, rcs: Iterable[str], by: str, now_s: float) -> None:
+        """Record that these RCs are being revoked for an ARC, or, if ``by`` names none, for another reason."""
+        self._revoked |= dict.fromkeys(rcs, (now_s, by))
 
     def granted(self, rcs: Iterable[str], arc: str, settle_s: float, now_s: float) -> None:
-        """Record a grant; it ends a switch if an RC was revoked from another ARC before."""
+        """Record a grant; it ends a switch if an RC was revoked for this ARC before."""
         revoked = [self._revoked.pop(rc) for rc in rcs if rc in self._revoked]
-        from_others = [at_s for at_s, other in revoked if other != arc]
-        if from_others:
-            self._times_s.append(now_s - min(from_others) - settle_s)
+        for_it = [at_s for at_s, by in revoked if by == arc]
+        if for_it:
+            self._times_s.append(now_s - min(for_it) - settle_s)
 
     def statistics(self) -> dict[str, float]:
         """Return the number of switches, and the median and 99th percentile of their times."""
