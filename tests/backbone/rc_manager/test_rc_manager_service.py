@@ -21,6 +21,7 @@ from backbone.rc_manager.messages import (
     AskUtilization,
     AskWhy,
     Done,
+    RcState,
     SetPriority,
     Withdraw,
 )
@@ -234,3 +235,30 @@ def test_two_arcs_of_a_radio_connect_in_the_order_of_their_epochs_even_if_one_is
 
     lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
     assert not [line for line in lines if line["ev"] in ("rc_state", "revoke")]
+
+
+def test_a_restarted_rc_manager_frees_the_other_rcs_of_arcs_whose_radio_does_not_obey(pool: Any) -> None:
+    """The radio keeps the hold of a dead ARC, so nobody can hold it rightly, and it counts as down."""
+
+    async def main() -> Path:
+        async with pool() as here:
+            one, two = await here.arc("one"), await here.arc("two")
+            async with here.beside(here.manager()):
+                await one.ask_for(request("one", "left", "radio"))
+                await here.clock.sleep_s(1.0)
+                assert one.is_open
+            radio = here.rcs["radio"]
+            radio.holders["ghost"], radio.does_not_obey = radio.last_epoch, True
+            async with here.beside(here.manager()):
+                await two.ask_for(request("two", "left"))
+                await here.clock.sleep_s(0.5)
+                assert (one.is_open, two.is_open) == (False, True)
+                radio.does_not_obey = False
+                state = RcState(radio.name, radio.launch.type, True, 1.0, [], radio.last_epoch, 0, 0)
+                radio.bus.publish(radio.address, Conversation.TELEMETRY, state)  # as an RC does that is missing
+                await here.clock.sleep_s(7.0)
+                assert one.is_open
+            return here.trace  # type: ignore[no-any-return]
+
+    lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
+    assert not [line for line in lines if line.get("id") == "left" and line.get("state") == "down"]
