@@ -7,12 +7,13 @@ import json
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
 import pytest
 from examples import rest_thorough
-from running_mission import mission_up
+from running_mission import RunningMission, mission_up
 
 from backbone.component.messages import AskStatistics, Statistics
 from backbone.debug_views import ListViews, Views
@@ -41,10 +42,19 @@ MISSION = f"""<mission name="m" priority="1"><modules>
 </modules></mission>"""
 
 
-@pytest.fixture(autouse=True)
-def _the_pair_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(EXAMPLES))
-    monkeypatch.syspath_prepend(EXAMPLES)
+@pytest.fixture(autouse=True, scope="module")
+def _the_pair_can_be_imported() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(EXAMPLES))
+        patch.syspath_prepend(EXAMPLES)
+        yield
+
+
+@pytest.fixture(scope="module")
+def example(_the_pair_can_be_imported: None) -> Iterator[RunningMission]:
+    """The example's mission, for tests that only look at it."""
+    with mission_up(mission_xml=EXAMPLES / "pair.xml") as running:
+        yield running
 
 
 @pytest.mark.parametrize("units", rest_thorough(reversed(ARRANGEMENTS.values())), ids=reversed(ARRANGEMENTS))
@@ -73,25 +83,49 @@ async def test_an_arrangement_says_what_the_modules_say_by_hand(units: str, tmp_
     assert msgspec.msgpack.encode(said) == msgspec.msgpack.encode(expected)
 
 
-async def test_the_example_goes_into_a_mission_unchanged() -> None:
-    with mission_up(mission_xml=EXAMPLES / "pair.xml") as mission:
-        async with mission.bus(TESTER) as bus:
-            import pair
+def test_load_shows_the_processor_time_of_modules_and_processes(example: RunningMission) -> None:
+    done = example.command("scout-backbone", "load", "--json", "--mission", example.name)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert {one["module"] for one in told["modules"]} == {"wave", "smoothing"}
+    assert all(one["unit"] == "waves" and one["rate_hz"] > 1.0 for one in told["modules"])
+    processes = {name: one for one in told["processes"] for name in one["components"]}
+    assert processes["waves"]["pid"] == example.component("waves")["pid"]
+    assert processes["launcher"]["processor_s"] > processes["waves"]["processor_s"] > 0.0
+    drawn = example.command("scout-backbone", "load", "--for", "0.1", "--mission", example.name)
+    assert "smoothing" in drawn.stdout
 
-            heard: asyncio.Queue[pair.Height] = asyncio.Queue()
-            at = "mission_control/waves/smooth"
-            bus.subscribe(at, Conversation.OUTPUTS, pair.Height, lambda one: heard.put_nowait(one.body))
-            async with asyncio.timeout(WITHIN_S):
-                for _ in range(5):
-                    await heard.get()
-            told = (await bus.ask("mission_control/waves", AskStatistics(), Statistics, within_s=WITHIN_S)).values
-            assert told["wave_runs"] == told["smoothing_runs"] >= 5
-            assert (await bus.ask("mission_control/waves", ListViews(), Views, within_s=WITHIN_S)).views == []
-        done = mission.command("scout-backbone", "check", str(EXAMPLES / "pair.xml"), "--dry-run", "--for", "1")
-        assert done.returncode == 0, done.stderr
-        assert "waves" in done.stdout
-        tree = mission.command("scout-backbone", "tree", "--json", "--mission", mission.name)
-        assert json.loads(tree.stdout)["tree"] == []
+
+async def test_the_example_goes_into_a_mission_unchanged(example: RunningMission) -> None:
+    async with example.bus(TESTER) as bus:
+        import pair
+
+        heard: asyncio.Queue[pair.Height] = asyncio.Queue()
+        at = "mission_control/waves/smooth"
+        bus.subscribe(at, Conversation.OUTPUTS, pair.Height, lambda one: heard.put_nowait(one.body))
+        async with asyncio.timeout(WITHIN_S):
+            for _ in range(5):
+                await heard.get()
+        told = (await bus.ask("mission_control/waves", AskStatistics(), Statistics, within_s=WITHIN_S)).values
+        assert told["wave_runs"] == told["smoothing_runs"] >= 5
+        assert (await bus.ask("mission_control/waves", ListViews(), Views, within_s=WITHIN_S)).views == []
+    done = example.command("scout-backbone", "check", str(EXAMPLES / "pair.xml"), "--dry-run", "--for", "1")
+    assert done.returncode == 0, done.stderr
+    assert "waves" in done.stdout
+    tree = example.command("scout-backbone", "tree", "--json", "--mission", example.name)
+    assert json.loads(tree.stdout)["tree"] == []
+
+
+def test_messages_that_a_module_declares_are_shown_with_the_names_of_their_fields(
+    example: RunningMission, tmp_path: Path
+) -> None:
+    which = ["--mission", example.name]
+    watched = example.command("scout-backbone", "watch", "*/waves/*", "--most", "1", "--for", "20", *which)
+    assert '"height_m":' in watched.stdout, watched.stderr
+    file = str(tmp_path / "waves.mcap")
+    example.command("scout-backbone", "record", "--to", file, "--for", "1", *which)
+    printed = example.command("scout-backbone", "recording", "print", file, "--keys", "*/outputs", "--most", "1")
+    assert '"height_m":' in printed.stdout, printed.stderr
 
 
 @pytest.mark.thorough
@@ -111,28 +145,3 @@ async def test_a_unit_goes_on_in_its_process_while_the_hub_of_its_mission_is_rep
         assert mission.component("nameserver")["pid"] != hub
         assert mission.component("waves")["pid"] == unit
         assert rounds > 0.8 * 20 * passed_s, (rounds, passed_s)
-
-
-def test_load_shows_the_processor_time_of_modules_and_processes() -> None:
-    with mission_up(mission_xml=EXAMPLES / "pair.xml") as mission:
-        done = mission.command("scout-backbone", "load", "--json", "--mission", mission.name)
-        assert done.returncode == 0, done.stderr
-        told = json.loads(done.stdout)
-        assert {one["module"] for one in told["modules"]} == {"wave", "smoothing"}
-        assert all(one["unit"] == "waves" and one["rate_hz"] > 1.0 for one in told["modules"])
-        processes = {name: one for one in told["processes"] for name in one["components"]}
-        assert processes["waves"]["pid"] == mission.component("waves")["pid"]
-        assert processes["launcher"]["processor_s"] > processes["waves"]["processor_s"] > 0.0
-        drawn = mission.command("scout-backbone", "load", "--for", "0.1", "--mission", mission.name)
-        assert "smoothing" in drawn.stdout
-
-
-def test_messages_that_a_module_declares_are_shown_with_the_names_of_their_fields(tmp_path: Path) -> None:
-    with mission_up(mission_xml=EXAMPLES / "pair.xml") as mission:
-        which = ["--mission", mission.name]
-        watched = mission.command("scout-backbone", "watch", "*/waves/*", "--most", "1", "--for", "20", *which)
-        assert '"height_m":' in watched.stdout, watched.stderr
-        file = str(tmp_path / "waves.mcap")
-        mission.command("scout-backbone", "record", "--to", file, "--for", "1", *which)
-    printed = mission.command("scout-backbone", "recording", "print", file, "--keys", "*/outputs", "--most", "1")
-    assert '"height_m":' in printed.stdout, printed.stderr
