@@ -95,8 +95,7 @@ async def test_a_text_that_the_server_would_not_read_is_not_sent_and_the_robot_s
         assert len(stage.placer.arcs) == 1
 
 
-@pytest.mark.parametrize("number", ["99999999999999999999", "1e300", "-5"])
-async def test_a_number_that_the_field_cannot_have_is_marked_there_and_not_sent(stage: Stage, number: str) -> None:
+async def test_a_number_that_the_field_cannot_have_is_marked_there_and_not_sent(stage: Stage) -> None:
     able = Abilities(commands=[CommandForm("show_off", FIELDS, roles=["dog"])])
     stage.know_commands(
         [ComponentType("capture", "x:Y", Subsystem.RESOURCE_POOL, needs={"dog": "dog"}, abilities=able)]
@@ -104,9 +103,10 @@ async def test_a_number_that_the_field_cannot_have_is_marked_there_and_not_sent(
     async with page_at(stage) as page:
         await take(page)
         for_s, show_off = page.get_by_role("spinbutton", name="for, at least 0 s"), page.get_by_text("Show off")
-        await for_s.fill(number)
-        await show_off.click()
-        assert await for_s.evaluate("field => field.matches(':invalid')")
+        for number in ("99999999999999999999", "1e300", "-5"):
+            await for_s.fill(number)
+            await show_off.click()
+            assert await for_s.evaluate("field => field.matches(':invalid')"), number
         await for_s.fill("2")
         await show_off.click()
         await wait_until(lambda: [one.values["for_s"] for one in given(stage)] == [2], "the possible one alone")

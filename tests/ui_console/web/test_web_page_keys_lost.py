@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
+from examples import rest_thorough
 from web_page import Key, Wheels, page_at, take
 from web_stage import Stage
 
@@ -21,7 +22,7 @@ TAKERS: dict[str, Callable[[Any], Awaitable[Any]]] = {
 }
 
 
-@pytest.mark.parametrize("taker", TAKERS)
+@pytest.mark.parametrize("taker", rest_thorough(TAKERS, quick=2))
 async def test_a_key_whose_release_may_not_be_reported_counts_as_released(stage: Stage, taker: str) -> None:
     async with page_at(stage) as page:
         await take(page)

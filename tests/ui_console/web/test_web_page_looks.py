@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from axe import serious_findings
+from examples import rest_thorough
 from web_browser import assert_no_sideways_scroll
 from web_page import ALL_SIZES, COVERED, card, page_at, stop_button, take, wait_stopped
 from web_stage import LOW, Stage
@@ -16,7 +17,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 LONG = "a-robot-with-a-rather-long-name-of-its-own"
 
 
-@pytest.mark.parametrize(("size", "share"), [("desktop", 0.5), ("tablet", 0.9), ("phone", 0.85)])
+@pytest.mark.parametrize(("size", "share"), rest_thorough([("phone", 0.85), ("desktop", 0.5), ("tablet", 0.9)]))
 async def test_the_robot_in_hand_is_large_and_the_others_are_small(stage: Stage, size: str, share: float) -> None:
     async with page_at(stage, size) as page:
         await take(page, "scout2")
@@ -29,7 +30,7 @@ async def test_the_robot_in_hand_is_large_and_the_others_are_small(stage: Stage,
         await assert_no_sideways_scroll(page)
 
 
-@pytest.mark.parametrize("size", ALL_SIZES)
+@pytest.mark.parametrize("size", rest_thorough(reversed(ALL_SIZES)))
 async def test_while_a_robot_is_driven_its_stop_and_that_of_all_are_in_sight_and_nothing_covers_them(
     stage: Stage, size: str
 ) -> None:
@@ -48,7 +49,7 @@ async def test_while_a_robot_is_driven_its_stop_and_that_of_all_are_in_sight_and
         await wait_stopped(page)
 
 
-@pytest.mark.parametrize("size", ALL_SIZES)
+@pytest.mark.parametrize("size", rest_thorough(reversed(ALL_SIZES)))
 async def test_long_words_of_people_push_no_button_off_the_screen(stage: Stage, size: str) -> None:
     async with page_at(stage, size) as page:
         await take(page)
@@ -205,7 +206,7 @@ async def test_by_keyboard_alone_a_robot_is_taken_stopped_lifted_and_released(st
         await page.wait_for_selector("body[data-held='']")
 
 
-@pytest.mark.parametrize("size", ALL_SIZES)
+@pytest.mark.parametrize("size", rest_thorough(reversed(ALL_SIZES)))
 async def test_what_gets_the_focus_is_not_hidden_below_what_stays_on_the_screen(stage: Stage, size: str) -> None:
     async with page_at(stage, size) as page:
         await take(page)

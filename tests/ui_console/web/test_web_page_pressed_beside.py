@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from examples import rest_thorough
 from web_page import Key, Mouse, Wheels, page_at, take, wait_stopped
 from web_stage import Stage
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
 
-@pytest.mark.parametrize("other", ["right", "middle"])
+@pytest.mark.parametrize("other", rest_thorough(["right", "middle"]))
 async def test_a_second_mouse_button_halts_and_neither_button_drives_before_a_new_press(
     stage: Stage, other: str
 ) -> None:
@@ -30,7 +31,7 @@ async def test_a_second_mouse_button_halts_and_neither_button_drives_before_a_ne
         await wheels.wait_halted()
 
 
-@pytest.mark.parametrize(("letter", "robot"), [("x", "scout1"), ("Shift+X", "scout2")])
+@pytest.mark.parametrize(("letter", "robot"), rest_thorough([("x", "scout1"), ("Shift+X", "scout2")]))
 async def test_a_letter_that_stops_does_so_while_alt_is_held_beside_a_drive_key(
     stage: Stage, letter: str, robot: str
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from examples import rest_thorough, some
+from examples import rest_thorough
 from web_browser import Cable, Finger
 from web_page import (
     ALL_SIZES,
@@ -33,7 +33,7 @@ HOLD_S = 1.0  # as holding.js has it
 
 @pytest.mark.parametrize(
     ("size", "robot", "gap_s"),
-    some((size, *way) for size in ALL_SIZES for way in (("scout1", 0.15), ("scout2", 0.3), ("scout3", 0.6))),
+    rest_thorough((size, *way) for size in ALL_SIZES for way in (("scout1", 0.15), ("scout2", 0.3), ("scout3", 0.6))),
 )
 async def test_stop_pressed_twice_at_one_place_stops_and_never_lifts(
     stage: Stage, size: str, robot: str, gap_s: float
