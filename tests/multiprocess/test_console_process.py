@@ -14,6 +14,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import crashing_console
 import pytest
 from fake_resource_pool import FakeArc, FakePlacer
 from free_ports import free_endpoint
@@ -236,3 +237,37 @@ async def test_a_terminal_that_goes_away_ends_the_console_and_gives_the_robot_ba
                     process.kill()
                     await process.wait()
             assert not placer.arcs
+
+
+async def test_a_console_that_crashes_gives_back_its_robot_and_its_terminal_and_says_so_by_its_exit_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, beside: Callable[..., Any]
+) -> None:
+    monkeypatch.setenv("TERM", "xterm-256color")
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(ours, (40, 132))
+    drawn = bytearray()
+    loop = asyncio.get_running_loop()
+    loop.add_reader(ours, lambda: drawn.extend(os.read(ours, 65536)))
+
+    def echoes() -> bool:
+        return bool(termios.tcgetattr(theirs)[3] & termios.ECHO)
+
+    async with placer_behind_a_hub(tmp_path, monkeypatch, beside) as placer, AsyncExitStack() as leftovers:
+        placer.on_arc = grant_at_once(placer)
+        async with asyncio.timeout(WITHIN_S):
+            command = (sys.executable, crashing_console.__file__, "scout-console", *ATTACH)
+            process = await asyncio.create_subprocess_exec(
+                *command, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True
+            )
+            leftovers.callback(lambda: process.returncode is None and process.kill())
+            await placer.wait(lambda: placer.arcs)
+            await placer.wait(lambda: b"scout1" in drawn)
+            assert not echoes()
+            os.write(ours, b"j")
+            assert await process.wait() == 1
+            await placer.wait(lambda: b"broken on purpose" in drawn)
+            assert echoes()
+            assert not placer.arcs
+    loop.remove_reader(ours)
+    os.close(ours)
+    os.close(theirs)
