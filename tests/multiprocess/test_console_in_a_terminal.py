@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import re
 import shutil
 import subprocess
@@ -12,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import crashing_console
 import pytest
 from running_mission import BIN, RunningMission, mission_up
 
@@ -162,26 +162,6 @@ def test_a_monitor_holds_nothing_asks_for_nothing_and_can_still_stop_all_robots(
         screen.shows(r"ENDED WITH 0")
 
 
-def test_a_monitor_without_a_screen_tells_the_same_as_json_lines(mission: RunningMission) -> None:
-    command = [str(BIN / "scout-console"), "monitor", "--json", "--mission", mission.name]
-    with subprocess.Popen(command, env=mission.environment, stdout=subprocess.PIPE, text=True) as watching:
-        assert watching.stdout is not None
-        words = {json.loads(watching.stdout.readline())["event"] for _line in range(5)}
-        watching.terminate()
-    assert "schedule" in words
-
-
-def test_a_script_is_told_once_all_that_screens_show(mission: RunningMission) -> None:
-    done = mission.command("scout-console", "monitor", "--once", "--mission", mission.name)
-    assert done.returncode == 0, done.stderr + mission.story()
-    view = json.loads(done.stdout)
-    assert view["mission"] == mission.name
-    assert [robot["robot"] for robot in view["robots"]] == ["scout1", "scout2", "scout3"]
-    assert [node["name"] for node in view["tree"]] == ["surveillance", "watch-scout1", "watch-scout2"]
-    assert [row["rc"] for row in view["timeline"]["rows"]]
-    assert not view["own"]["is_asked"]
-
-
 # ---------------------------------------------------------------------- whatever the terminal
 TERMINALS = ["TERM=xterm-256color", "TERM=vt100", "TERM=dumb", "NO_COLOR=1", "TEXTUAL_THEME=textual-light"]
 SIZES = [(80, 24), (120, 40), (200, 60)]
@@ -259,28 +239,13 @@ def test_a_console_is_drawn_in_any_terminal_and_ctrl_c_ends_it(
         ended_well(screen, 130)
 
 
-CRASHING = """
-import sys
-from ui_console.terminal.app import ConsoleApp
-from ui_console import cli
-
-def crash(self):
-    raise ZeroDivisionError("this console is broken on purpose")
-
-ConsoleApp.action_jump = crash
-sys.argv = sys.argv[1:]
-cli.main()
-"""
-
-
+@pytest.mark.thorough
 def test_a_console_that_crashes_gives_its_robot_back_and_the_terminal_and_says_so_by_its_exit_code(
     mission: RunningMission, tmp_path: Path
 ) -> None:
-    program = tmp_path / "crashing.py"
-    program.write_text(CRASHING)
     with terminal(mission, tmp_path) as screen:
         words = ["scout-console", "attach", "scout3", "--user", "anna", "--mission", mission.name]
-        screen.open("python", str(program), *words)
+        screen.open("python", crashing_console.__file__, *words)
         screen.shows(r"you hold scout3")
         screen.press("j")
         shown = screen.shows(r"ENDED WITH 1\n-?echo")

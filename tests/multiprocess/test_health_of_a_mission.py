@@ -57,13 +57,6 @@ def paused(*pids: int) -> Iterator[None]:
                 os.kill(pid, signal.SIGCONT)
 
 
-def test_a_whole_mission_is_ok(mission: RunningMission) -> None:
-    found = wait_for(mission, lambda code, found: (code, found["health"]) == (0, "ok"), "health ok")
-    assert found["absent"] == found["problems"] == found["stops"] == []
-    text = mission.command("scout-backbone", "status", "--mission", mission.name).stdout
-    assert text.splitlines()[0].endswith("health ok")
-
-
 @pytest.mark.thorough
 @pytest.mark.alone  # what is asked while it hangs must be answered before the launcher replaces it
 def test_a_core_service_that_hangs_is_absent_in_status_why_and_up_until_it_answers(mission: RunningMission) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import re
+import subprocess
+import time
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from running_mission import RunningMission, mission_up
+from running_mission import BIN, RunningMission, mission_up
 
 from resource_pool.localization import AskPose, Pose
 
@@ -44,6 +46,37 @@ def test_status_lists_every_component_under_one_of_four_subsystems(mission: Runn
     assert by_name["watch-scout1"]["subsystem"] == "mission_control"
     assert {rc["rc"] for rc in status["rcs"]} == RCS
     assert not status["problems"]
+
+
+def test_a_whole_mission_is_ok(mission: RunningMission) -> None:
+    deadline = time.monotonic() + 30.0
+    while (done := mission.command("scout-backbone", "status", "--json", "--mission", mission.name)).returncode:
+        assert time.monotonic() < deadline, f"{done.stdout}{done.stderr}\n{mission.story()}"
+    found = json.loads(done.stdout)
+    assert found["health"] == "ok"
+    assert found["absent"] == found["problems"] == found["stops"] == []
+    text = mission.command("scout-backbone", "status", "--mission", mission.name).stdout
+    assert text.splitlines()[0].endswith("health ok")
+
+
+def test_a_monitor_without_a_screen_tells_the_same_as_json_lines(mission: RunningMission) -> None:
+    command = [str(BIN / "scout-console"), "monitor", "--json", "--mission", mission.name]
+    with subprocess.Popen(command, env=mission.environment, stdout=subprocess.PIPE, text=True) as watching:
+        assert watching.stdout is not None
+        words = {json.loads(watching.stdout.readline())["event"] for _line in range(5)}
+        watching.terminate()
+    assert "schedule" in words
+
+
+def test_a_script_is_told_once_all_that_screens_show(mission: RunningMission) -> None:
+    done = mission.command("scout-console", "monitor", "--once", "--mission", mission.name)
+    assert done.returncode == 0, done.stderr + mission.story()
+    view = json.loads(done.stdout)
+    assert view["mission"] == mission.name
+    assert [robot["robot"] for robot in view["robots"]] == ["scout1", "scout2", "scout3"]
+    assert [node["name"] for node in view["tree"]] == ["surveillance", "watch-scout1", "watch-scout2"]
+    assert [row["rc"] for row in view["timeline"]["rows"]]
+    assert not view["own"]["is_asked"]
 
 
 def test_why_names_the_blocker_of_the_waiting_watcher(mission: RunningMission) -> None:

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from examples import rest_thorough
 
 from backbone import run_files, run_names
 
@@ -68,20 +69,23 @@ def test_both_programs_print_the_version_that_is_installed(program: str, tmp_pat
 
 @pytest.mark.parametrize(
     ("typed", "offered"),
-    [
-        (("scout-backbone", "sta"), ["status", "start"]),
-        (("scout-backbone", "--ver"), ["--version"]),
-        (("scout-backbone", "status", "--wa"), ["--watch"]),
-        (("scout-backbone", "why", ""), []),
-        (("scout-backbone", "status", "--mission", ""), []),
-        (("scout-backbone", "components", "--type", ""), []),
-        (("scout-backbone", "resources", ""), []),
-        (("scout-backbone", "start", ""), []),
-        (("scout-backbone", "log", "--level", "war"), ["warning"]),
-        (("scout-console", "mon"), ["monitor"]),
-        (("scout-console", "attach", ""), []),
-        (("scout-console", "attach", "scout1", "--priority", "5", "--prof"), ["--profile"]),
-    ],
+    rest_thorough(
+        [
+            (("scout-backbone", "sta"), ["status", "start"]),
+            (("scout-backbone", "why", ""), []),
+            (("scout-backbone", "status", "--mission", ""), []),
+            (("scout-console", "attach", "scout1", "--priority", "5", "--prof"), ["--profile"]),
+            (("scout-backbone", "--ver"), ["--version"]),
+            (("scout-backbone", "status", "--wa"), ["--watch"]),
+            (("scout-backbone", "components", "--type", ""), []),
+            (("scout-backbone", "resources", ""), []),
+            (("scout-backbone", "start", ""), []),
+            (("scout-backbone", "log", "--level", "war"), ["warning"]),
+            (("scout-console", "mon"), ["monitor"]),
+            (("scout-console", "attach", ""), []),
+        ],
+        quick=4,
+    ),
     ids=str,
 )
 def test_completion_loads_nothing_heavy_where_no_mission_is_up(
@@ -94,12 +98,15 @@ def test_completion_loads_nothing_heavy_where_no_mission_is_up(
 
 @pytest.mark.parametrize(
     ("typed", "offered"),
-    [
-        (("scout-backbone", "why", ""), ["scout1", "watch1"]),
-        (("scout-backbone", "start", ""), ["patrol"]),
-        (("scout-console", "attach", ""), ["scout1"]),
-        (("scout-console", "look", ""), ["watch1"]),
-    ],
+    rest_thorough(
+        [
+            (("scout-backbone", "why", ""), ["scout1", "watch1"]),
+            (("scout-console", "look", ""), ["watch1"]),
+            (("scout-backbone", "start", ""), ["patrol"]),
+            (("scout-console", "attach", ""), ["scout1"]),
+        ],
+        quick=2,
+    ),
     ids=str,
 )
 def test_names_of_a_mission_that_is_up_are_completed_without_asking_it(
@@ -116,18 +123,20 @@ def test_names_of_a_mission_that_is_up_are_completed_without_asking_it(
 
 @pytest.mark.parametrize(
     "words",
-    [
-        ("status",),
-        ("status", "--json"),
-        ("status", "--mission", "m"),
-        ("status", "--mission", "m", "--connect", "tcp/127.0.0.1:1"),
-        ("why", "scout1", "--mission", "m"),
-        ("story", "scout1"),
-    ],
-    ids=" ".join,
+    rest_thorough(
+        [
+            "status --json",
+            "why scout1 --mission m",
+            "status --mission m --connect tcp/127.0.0.1:1",
+            "status",
+            "status --mission m",
+            "story scout1",
+        ],
+        quick=3,
+    ),
 )
 def test_a_question_to_no_mission_loads_no_description_no_simulation_and_no_conversion_of_texts(
-    words: tuple[str, ...], tmp_path: Path
+    words: str, tmp_path: Path
 ) -> None:
-    _, loaded = run("scout-backbone", *words, folder=tmp_path)
+    _, loaded = run("scout-backbone", *words.split(), folder=tmp_path)
     assert loaded <= {"asyncio", "msgspec", "uvloop", "zenoh", *([] if "--json" in words else ["rich"])}

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from examples import rest_thorough
 
 pytestmark = pytest.mark.processes
 
@@ -27,7 +28,7 @@ def ended(words: str, where: Path, **more: str) -> subprocess.CompletedProcess[s
     )
 
 
-@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", rest_thorough(["<&- >&- 2>&-", "<&-", ">&-", "2>&-"]))
 def test_a_command_with_a_closed_stream_ends_as_without(closed: str, tmp_path: Path) -> None:
     assert ended(f"status {closed}", tmp_path).returncode == NOT_UP
     assert ended(f"schema {closed}", tmp_path).returncode == 0
