@@ -116,6 +116,7 @@ async def test_of_a_thousand_pictures_sent_at_once_a_lossless_listener_gets_all(
     assert numbers == sorted(set(numbers))
 
 
+@pytest.mark.alone  # it measures how long the sender is busy
 async def test_a_lossless_listener_that_hangs_delays_nobody_and_gets_all_when_it_goes_on(
     processes: Processes, sender: ZenohBus
 ) -> None:

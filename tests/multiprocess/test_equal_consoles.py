@@ -14,12 +14,12 @@ from backbone.mission_log.operators import OperatorActed, OperatorAction
 from resource_pool.arc_client import Suspended
 from ui_console.model.consent import Sought
 from ui_console.model.driving import DriveWish
-from ui_console.model.events import ConsentHeard, GivenBack, Granted, said
+from ui_console.model.events import ConsentHeard, GivenBack, Granted
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
 SLICE_S = 5.0
-HEARD_LATE_S = 0.3  # a console on a busy machine hears of its end so much later than the other of its grant
+SHORT_SLICE_S = 1.0
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ async def test_who_holds_a_robot_lets_an_equal_who_asks_have_it_before_the_slice
 async def test_equals_who_ask_for_nothing_but_the_robot_take_turns(mission: RunningMission) -> None:
     async with mission.bus("ui_console/onlooker") as bus:
         people = [("cleo", 100), ("dan", 100)]
-        async with consoles_at_work(mission, bus, "scout3", people, minimum_runtime_s=1.0) as (cleo, dan):
+        async with consoles_at_work(mission, bus, "scout3", people, minimum_runtime_s=SHORT_SLICE_S) as (cleo, dan):
             await cleo.take_and_drive(DriveWish(4.0, 4.0))
             assert dan.component is not None
             dan.component.take()
@@ -84,7 +84,8 @@ async def test_equals_who_ask_for_nothing_but_the_robot_take_turns(mission: Runn
             await dan.hears(0, Granted)
             lost = await cleo.hears(mark, Suspended)
             assert lost.by == "dan-drive"
-            lost_s = next(event.at_s for event in cleo.events[mark:] if said(event) is lost)
             again = await cleo.hears(mark, Granted)
             assert again.again
-            assert 1.0 - HEARD_LATE_S <= again.at_s - lost_s < WAIT_S
+            told = await bus.ask("resource_pool/scout3", AskStory(), Story, within_s=2)
+    of_dan = {event.what.partition(" ")[0]: event.at_s for event in told.events if event.subject == "dan-drive"}
+    assert SHORT_SLICE_S <= of_dan["disconnected:"] - of_dan["connected"] < WAIT_S, told  # by the robot's own clock
