@@ -88,7 +88,14 @@ def has_named_memory(one: Process) -> bool:
     return any("/dev/shm" in name for name in named)  # noqa: S108
 
 
-@pytest.mark.parametrize("reads", [6_000, pytest.param(1_000_000, marks=[pytest.mark.slow, pytest.mark.alone])])
+@pytest.mark.parametrize(
+    "reads",
+    [
+        1_500,
+        pytest.param(6_000, marks=pytest.mark.thorough),
+        pytest.param(1_000_000, marks=[pytest.mark.slow, pytest.mark.alone]),
+    ],
+)
 def test_no_value_that_is_read_during_writes_is_torn(processes: Processes, reads: int) -> None:
     processes.begun("writer", 0)
     readers = [processes.begun("reader", reads // 3) for _ in range(3)]

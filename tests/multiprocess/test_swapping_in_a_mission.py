@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from examples import rest_thorough
 from running_mission import RunningMission, mission_up
 
 from backbone.bus.zenoh_bus import ZenohBus
@@ -227,7 +228,7 @@ async def test_an_interrupted_command_says_that_the_exchange_goes_on_and_it_does
 
 
 @pytest.mark.alone  # a machine that is full loses messages at 30 Hz without any swap, too
-@pytest.mark.parametrize("mission", ["false", "true"], indirect=True, ids=["in the event loop", "in a thread"])
+@pytest.mark.parametrize("mission", rest_thorough(["true", "false"]), indirect=True, ids=["in a thread", "in the loop"])
 @pytest.mark.parametrize("count", [10, pytest.param(MANY, marks=pytest.mark.slow)])
 async def test_swaps_at_thirty_hertz_lose_one_message_at_most(
     mission: RunningMission, source: Path, count: int
@@ -255,11 +256,12 @@ BROKEN = {
 }
 
 
-async def test_twenty_swaps_to_broken_classes_leave_the_old_one_and_name_the_cause(
-    mission: RunningMission, source: Path
+@pytest.mark.parametrize("times", rest_thorough([1, 5]))
+async def test_swaps_to_broken_classes_leave_the_old_one_and_name_the_cause(
+    mission: RunningMission, source: Path, times: int
 ) -> None:
     async with talk_with(mission) as talk:
-        for _ in range(5):
+        for _ in range(times):
             for old, new, cause in BROKEN.values():
                 edit(source, SOURCE.replace(old, new))
                 try:
