@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -21,3 +23,17 @@ def judged() -> Judged:
         assert [str(one) for one in found if one.code not in allowed] == []
 
     return judge
+
+
+@pytest.fixture
+def full_pipe() -> Iterator[int]:
+    """Return the end for writing of a pipe that takes no more bytes."""
+    reader, its_end = os.pipe()
+    os.set_blocking(its_end, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(its_end, b" ")
+    os.set_blocking(its_end, True)
+    yield its_end
+    os.close(its_end)
+    os.close(reader)

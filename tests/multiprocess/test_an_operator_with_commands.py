@@ -120,6 +120,15 @@ def test_missions_that_are_up_are_completed(mission: RunningMission, tmp_path: P
     assert mission.name in completed(mission, "scout-backbone", "scout-backbone status --mission ", "bash")
 
 
+def test_top_ends_when_its_time_is_over_though_nobody_reads_it(full_pipe: int, mission: RunningMission) -> None:
+    words = [str(BIN / "scout-backbone"), "top", "--for", "0.5", "--mission", mission.name]
+    done = subprocess.run(
+        words, env=mission.environment, stdout=full_pipe, stderr=subprocess.PIPE, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0
+    assert "came faster than they were read" in done.stderr
+
+
 def injected(mission: RunningMission, key: str, said: str) -> subprocess.CompletedProcess[str]:
     return mission.command("scout-backbone", "inject", key, said, "--mission", mission.name)
 

@@ -1,4 +1,4 @@
-"""The mission of IROS 2001, figure 2, as real processes."""
+"""The mission of IROS 2001, figure 2, as real processes, and those that look at it from beside."""
 
 from __future__ import annotations
 
@@ -7,17 +7,22 @@ import math
 import re
 import subprocess
 import time
+import urllib.request
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
+from prometheus_client.parser import text_string_to_metric_families
 from running_mission import BIN, RunningMission, mission_up
+from tool_at_a_port import tool_at
 
 from resource_pool.localization import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
 RCS = {"scout1", "scout2", "scout3", "radio", "video1", "grabber", "localizer"}
+SEEN_WITHIN_S = 30.0
 CORE_ORDER = ["nameserver", "component_database", "placer", "creator-base", "dependency_database", "rc_manager"]
 
 
@@ -77,6 +82,39 @@ def test_a_script_is_told_once_all_that_screens_show(mission: RunningMission) ->
     assert [node["name"] for node in view["tree"]] == ["surveillance", "watch-scout1", "watch-scout2"]
     assert [row["rc"] for row in view["timeline"]["rows"]]
     assert not view["own"]["is_asked"]
+
+
+def counters(port: int) -> dict[tuple[str, ...], float]:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as page:
+        families = text_string_to_metric_families(page.read().decode())
+        counted = [sample for family in families if family.type == "counter" for sample in family.samples]
+    return {(one.name, *(value for _name, value in sorted(one.labels.items()))): one.value for one in counted}
+
+
+def held_s(found: dict[tuple[str, ...], float], rc: str) -> float:
+    """Return for how long the RC was held."""
+    return sum(value for (name, *of), value in found.items() if name == "scout_rc_held_seconds_total" and rc in of)
+
+
+def test_prometheus_reads_who_held_what_and_no_counter_falls(mission: RunningMission) -> None:
+    port = free_port()
+    with tool_at(mission, "metrics", port):
+        before, until_s = counters(port), time.monotonic() + SEEN_WITHIN_S
+        while not (held_s(before, "video1") and any(name == "scout_rc_grants_total" for name, *_ in before)):
+            assert time.monotonic() < until_s, before
+            time.sleep(0.2)
+            after = counters(port)
+            assert all(after[name] >= value for name, value in before.items())
+            before = after
+    assert held_s(before, "video1") <= before["scout_watched_seconds_total",]
+
+
+def test_a_port_that_is_taken_is_refused(mission: RunningMission) -> None:
+    port = free_port()
+    with tool_at(mission, "metrics", port):
+        for command in ("bridge", "metrics"):
+            done = mission.command("scout-backbone", command, "--port", str(port), "--mission", mission.name)
+            assert (done.returncode, "--port" in done.stderr) == (2, True), done.stderr
 
 
 def test_why_names_the_blocker_of_the_waiting_watcher(mission: RunningMission) -> None:

@@ -1,21 +1,19 @@
-"""Foxglove and Prometheus read a real mission from beside it."""
+"""Foxglove reads a real mission from beside it, and who looks at one ends with it."""
 
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import sys
 import time
-import urllib.request
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from free_ports import free_port
-from prometheus_client.parser import text_string_to_metric_families
 from running_mission import BIN, RunningMission, mission_up
+from tool_at_a_port import tool_at
 from websockets.asyncio.client import connect
 from websockets.typing import Subprotocol
 
@@ -32,29 +30,10 @@ def mission() -> Iterator[RunningMission]:
         yield running
 
 
-@contextmanager
-def serving(mission: RunningMission, command: str, port: int) -> Iterator[None]:
-    """Run a command that serves at a port; it listens when this is entered, and has ended well afterwards."""
-    words = [str(BIN / "scout-backbone"), command, "--port", str(port), "--mission", mission.name]
-    server = subprocess.Popen(words, env=mission.environment, stderr=subprocess.PIPE, text=True)
-    assert server.stderr is not None
-    try:
-        said = server.stderr.readline()
-        assert f"127.0.0.1:{port}" in said, said + server.stderr.read()
-        yield
-        server.send_signal(signal.SIGINT)
-        _none, rest = server.communicate(timeout=20)
-        assert server.returncode == 0, rest
-    finally:
-        server.kill()
-        server.wait(10)
-        server.stderr.close()
-
-
 @pytest.mark.thorough
 async def test_foxglove_sees_the_cameras_of_a_mission(mission: RunningMission) -> None:
     port = free_port()
-    with serving(mission, "bridge", port):
+    with tool_at(mission, "bridge", port):
         protocol = [Subprotocol("foxglove.sdk.v1")]
         async with connect(f"ws://127.0.0.1:{port}", subprotocols=protocol, max_size=None) as link:
             topics: set[str] = set()
@@ -72,31 +51,6 @@ async def test_foxglove_sees_the_cameras_of_a_mission(mission: RunningMission) -
                         await link.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
 
 
-def counters(port: int) -> dict[tuple[str, ...], float]:
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as page:
-        families = text_string_to_metric_families(page.read().decode())
-        counted = [sample for family in families if family.type == "counter" for sample in family.samples]
-    return {(one.name, *(value for _name, value in sorted(one.labels.items()))): one.value for one in counted}
-
-
-def held_s(found: dict[tuple[str, ...], float], rc: str) -> float:
-    """Return for how long the RC was held."""
-    return sum(value for (name, *of), value in found.items() if name == "scout_rc_held_seconds_total" and rc in of)
-
-
-def test_prometheus_reads_who_held_what_and_no_counter_falls(mission: RunningMission) -> None:
-    port = free_port()
-    with serving(mission, "metrics", port):
-        before, until_s = counters(port), time.monotonic() + SEEN_WITHIN_S
-        while not (held_s(before, "video1") and any(name == "scout_rc_grants_total" for name, *_ in before)):
-            assert time.monotonic() < until_s, before
-            time.sleep(0.2)
-            after = counters(port)
-            assert all(after[name] >= value for name, value in before.items())
-            before = after
-    assert held_s(before, "video1") <= before["scout_watched_seconds_total",]
-
-
 @pytest.mark.parametrize(
     ("command", "library", "extra"), [("bridge", "foxglove", "foxglove"), ("metrics", "prometheus_client", "metrics")]
 )
@@ -104,14 +58,6 @@ def test_without_its_library_a_command_tells_what_to_install(command: str, libra
     code = f"import sys; sys.modules['{library}'] = None\nfrom backbone.command_line.cli import app; app(['{command}'])"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
     assert (done.returncode, f"scout-backbone[{extra}]" in done.stderr) == (2, True), done.stderr
-
-
-def test_a_port_that_is_taken_is_refused(mission: RunningMission) -> None:
-    port = free_port()
-    with serving(mission, "metrics", port):
-        for command in ("bridge", "metrics"):
-            done = mission.command("scout-backbone", command, "--port", str(port), "--mission", mission.name)
-            assert (done.returncode, "--port" in done.stderr) == (2, True), done.stderr
 
 
 @pytest.mark.thorough
