@@ -1,6 +1,6 @@
 """A hub and listeners to a burst of pictures, each a process of its own.
 
-``burst_roles.py hub ENDPOINT`` or ``burst_roles.py every|newest|lossless|recorder ENDPOINT``
+``burst_roles.py hub|"spare hub" ENDPOINT`` or ``burst_roles.py every|newest|lossless|recorder ENDPOINT``
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ from resource_pool.messages import Frame
 MISSION, GRABBER = "burst", "resource_pool/framegrabber1"
 
 
-async def hub(endpoint: str) -> None:
-    """Serve until killed."""
+async def hub(endpoint: str, *, waits: bool) -> None:
+    """Serve until killed; if it waits, from a line on."""
+    if waits:
+        say("ready")
+        await asyncio.get_running_loop().run_in_executor(None, sys.stdin.readline)
     serving = ZenohBus.open(MISSION, "backbone/hub", MissionClock(0.0), hub_config([endpoint]))
     say("ready")
     await asyncio.Event().wait()
@@ -58,4 +61,4 @@ def say(text: str) -> None:
 
 if __name__ == "__main__":
     role, at = sys.argv[1:]
-    asyncio.run(hub(at) if role == "hub" else listen(role, at))
+    asyncio.run(hub(at, waits=role == "spare hub") if role.endswith("hub") else listen(role, at))
