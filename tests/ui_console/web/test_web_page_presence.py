@@ -17,10 +17,10 @@ TOUCHES: dict[str, Callable[[Any], Awaitable[Any]]] = {
 }
 
 
-async def test_an_operator_who_touches_the_page_is_there_again(stage: Stage) -> None:
+@pytest.mark.parametrize("touch", TOUCHES)
+async def test_an_operator_who_touches_the_page_is_there_again(stage: Stage, touch: str) -> None:
     async with page_at(stage) as page:
         [operator] = stage.hub.clients
-        for name, touch in TOUCHES.items():
-            operator.is_there = False
-            await touch(page)
-            await wait_until(lambda: operator.is_there, f"there by {name}")
+        operator.is_there = False
+        await TOUCHES[touch](page)
+        await wait_until(lambda: operator.is_there, f"there by {touch}")
