@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from scout_model.air import (
     FADE_S,
@@ -26,13 +27,14 @@ from scout_model.air import (
 from scout_model.description import AirDescription
 
 RATE_HZ = 60
-COURSES = np.array(
-    [
-        [fading.power(sample / RATE_HZ) for sample in range(60 * RATE_HZ)]
-        for fading in (Fading((seed, 1)) for seed in range(8))
-    ]
-)
 metres = st.floats(NEAREST_M, 500)
+
+
+@pytest.fixture(scope="module")
+def courses() -> NDArray[np.float64]:
+    """Return the power during one minute, for each of eight seeds."""
+    fadings = [Fading((seed, 1)) for seed in range(8)]
+    return np.array([[fading.power(sample / RATE_HZ) for sample in range(60 * RATE_HZ)] for fading in fadings])
 
 
 @given(metres, metres)
@@ -49,14 +51,16 @@ def test_at_the_reference_distance_the_weight_of_distance_plays_no_part(away_m: 
     assert counted_distance_m(away_m, 1.0) == pytest.approx(away_m)
 
 
-def test_power_is_one_on_average_and_exponentially_distributed_as_rayleighs() -> None:
-    assert COURSES.mean() == pytest.approx(1.0, abs=0.05)
+def test_power_is_one_on_average_and_exponentially_distributed_as_rayleighs(courses: NDArray[np.float64]) -> None:
+    assert courses.mean() == pytest.approx(1.0, abs=0.05)
     for level in (0.1, 0.288, 1.0, 2.0):
-        assert (level > COURSES).mean() == pytest.approx(1.0 - math.exp(-level), abs=0.03)
+        assert (level > courses).mean() == pytest.approx(1.0 - math.exp(-level), abs=0.03)
 
 
-def test_at_the_reference_distance_a_quarter_of_the_time_is_faded_for_a_seventh_of_a_second_each() -> None:
-    faded = fade_level(REFERENCE_M) > COURSES
+def test_at_the_reference_distance_a_quarter_of_the_time_is_faded_for_a_seventh_of_a_second_each(
+    courses: NDArray[np.float64],
+) -> None:
+    faded = fade_level(REFERENCE_M) > courses
     begun = np.count_nonzero(np.diff(faded.astype(int), axis=1) == 1)
     assert faded.mean() == pytest.approx(FADED_SHARE, abs=0.03)
     assert faded.sum() / begun / RATE_HZ == pytest.approx(FADE_S, rel=0.15)
