@@ -86,6 +86,7 @@ def _is_of_the_product(kind: type[Any]) -> bool:
     return kind.__module__.partition(".")[0] in PACKAGES
 
 
+@functools.cache
 def _fields(kind: type[Any]) -> tuple[inspect.Field, ...]:
     described = inspect.type_info(kind)
     assert isinstance(described, inspect.StructType)
