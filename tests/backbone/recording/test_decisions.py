@@ -10,7 +10,7 @@ from random import Random
 from typing import Any
 
 import pytest
-from examples import share
+from examples import share, some
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -154,7 +154,7 @@ def test_what_is_missing_is_counted_and_no_difference(recorded: RecordMission):
     assert sum(one.missing for one in found) > 0
 
 
-@pytest.mark.parametrize(("seed", "most"), [(2, 37), *((1, most) for most in range(100, 110))])
+@pytest.mark.parametrize(("seed", "most"), some([(2, 37), *((1, most) for most in range(100, 110))]))
 def test_a_decision_at_whose_lines_the_recording_ends_is_not_missing(recorded: RecordMission, seed: int, most: int):
     heard = list[str]()
 
