@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from random import Random
 
 import pytest
+from examples import rest_thorough
 from simulated_switches import Bench, ask, load, manager, sharable, states, unit
 
 from backbone.scheduling.entries import ArcEntry
@@ -46,8 +47,9 @@ def test_the_last_of_twelve_equals_hears_of_its_turn_after_many_minutes(run_s: f
     assert "no gap" not in why.lines[0]
 
 
-def test_what_why_says_of_an_rc_it_says_of_each_arc_that_waits_for_it() -> None:
-    bench = mesh(24)
+@pytest.mark.parametrize("count", rest_thorough([15, 24]))
+def test_what_why_says_of_an_rc_it_says_of_each_arc_that_waits_for_it(count: int) -> None:
+    bench = mesh(count)
     lines = bench.answers.why("radio", NOW_S).lines
     whys = [bench.answers.why(arc, NOW_S) for arc in waiting(bench)]
     assert whys
