@@ -14,26 +14,30 @@ from backbone.launcher.endings import ExitCode
 from backbone.mission_log.log import EVENTS_KEPT
 
 EACH_S = 0.5
-MANY = EVENTS_KEPT + 5
+MANY = EVENTS_KEPT + 5  # more than a mission keeps
 
 
-@pytest.fixture(scope="module")
-def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a recording of more events than a mission keeps."""
-    events = (StoryEvent(EACH_S * at, SCOUT, f"event {at}", "scout1", "", LogLevel.INFO) for at in range(MANY))
-    path = tmp_path_factory.mktemp("night") / "night.mcap"
+def night(folder: Path, count: int) -> Path:
+    """Return a recording of so many events."""
+    events = (StoryEvent(EACH_S * at, SCOUT, f"event {at}", "scout1", "", LogLevel.INFO) for at in range(count))
+    path = folder / "night.mcap"
     path.write_bytes(recorded(Said(event.at_s, SCOUT, Conversation.LOG, event) for event in events).getvalue())
     return path
 
 
 @pytest.mark.parametrize(
-    ("since_s", "until_s", "numbers"),
-    [(0.0, None, range(MANY)), (0.0, 1.0, range(3)), (1e-5, 1.0, range(1, 3)), (1e9, None, range(0))],
+    ("count", "since_s", "until_s", "numbers"),
+    [(MANY, 0.0, None, range(MANY)), (9, 0.0, 1.0, range(3)), (9, 1e-5, 1.0, range(1, 3)), (9, 1e9, None, range(0))],
 )
 async def test_each_event_of_that_time_is_printed(
-    night: Path, capsys: pytest.CaptureFixture[str], since_s: float, until_s: float | None, numbers: range
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    count: int,
+    since_s: float,
+    until_s: float | None,
+    numbers: range,
 ) -> None:
-    assert await print_events(night, "scout1", since_s, until_s, as_json=False) is ExitCode.DONE
+    assert await print_events(night(tmp_path, count), "scout1", since_s, until_s, as_json=False) is ExitCode.DONE
     lines = capsys.readouterr().out.splitlines()
     assert [line.rpartition(" ")[2] for line in lines] == [str(number) for number in numbers]
 
