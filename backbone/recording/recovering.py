@@ -82,7 +82,7 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
         NoRecording: Not even the begin is there; ``NotOfMessages``: it is another program's file.
     """
     whole, lost, has_begun, has_all = _WholeRecording(to), 0, False, False
-    index, size = _index(damaged), damaged.seek(0, os.SEEK_END)
+    index = _index(damaged)
     if index is not None and _is_of_a_bus(damaged):
         lost = _take_by_index(whole, damaged, index)
         whole.finish()
@@ -103,8 +103,9 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
             raise NoRecording(
                 f"no recording: {why}", remedy="Name a recording; this file has nothing of one."
             ) from error
-        read_to = size if has_all else read_to  # the index follows; it is written again
+        read_to = damaged.seek(0, os.SEEK_END) if has_all else read_to  # the index follows; it is written again
     whole.finish()
+    size = damaged.seek(0, os.SEEK_END)  # only now: its recorder may still write it
     return Recovered(whole.messages, lost, size - read_to)
 
 
