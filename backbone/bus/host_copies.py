@@ -104,6 +104,10 @@ class HostCopies:
             self._connect()
         return self._socket is not None
 
+    def look_now(self) -> None:
+        """Look for a recorder with the next message."""
+        self._look_again_s = -math.inf
+
     def send(self, key: str, raw: bytes) -> None:
         """Send a copy, or drop it if too much waits. Never waits."""
         if self._socket is None:
@@ -140,7 +144,7 @@ class HostCopies:
     def _ended(self) -> None:
         """Look for another recorder with the next message. A recorder sends nothing, so a readable socket has ended."""
         self._disconnect()
-        self._look_again_s = -math.inf
+        self.look_now()
 
     def _disconnect(self) -> None:
         if self._socket is not None:

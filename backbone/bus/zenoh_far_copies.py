@@ -35,14 +35,14 @@ class FarCopies:
     def __init__(self, session: zenoh.Session, mission: str, source: str) -> None:
         self._loop = asyncio.get_running_loop()
         self._waiting, self._waiting_bytes = list[bytes](), 0
-        self._is_open, self._is_matched = True, False
+        self._is_open, self._is_matched, self._is_new = True, False, False
         self._known_s = self._loop.time() + zenoh_outlets.KNOWN_AFTER_S
         self._publisher = session.declare_publisher(
             key(mission, source, Conversation.FAR), **zenoh_outlets.on_the_wire(QUALITY[Conversation.FAR])
         )
 
         def changed(status: zenoh.MatchingStatus) -> None:
-            self._is_matched = bool(cast("Any", status).matching)  # zenoh's stubs declare the status as bool
+            self._is_new = self._is_matched = bool(cast("Any", status).matching)  # zenoh's stubs: it is a bool
 
         self._matching: Any = self._publisher.declare_matching_listener(
             zenoh.handlers.Callback(changed, indirect=False)
@@ -58,6 +58,13 @@ class FarCopies:
         if conversation in PICTURES:
             return False
         return self._is_matched or (conversation is not Conversation.OUTPUTS and self._loop.time() < self._known_s)
+
+    def has_new_listener(self) -> bool:
+        """Return whether a recorder has begun to listen since the last call."""
+        if not self._is_new:
+            return False
+        self._is_new = False
+        return True
 
     def send(self, key: str, raw: bytes) -> None:
         """Publish a copy soon, with others."""
@@ -85,6 +92,8 @@ def copiers(host: HostCopies | None, far: FarCopies | None, conversation: Conver
     """Return the copiers for a message: none, the recorder of this host, the network, or both."""
     if conversation in COPIED:
         return ()
+    if host is not None and far is not None and far.has_new_listener():
+        host.look_now()  # its socket may be on this host, and only a socket brings it pictures
     near = host if host is not None and host.find_recorder() else None
     if near is not None and near.reach_mission:
         return (near,)

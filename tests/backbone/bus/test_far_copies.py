@@ -152,6 +152,22 @@ async def test_a_process_sends_no_copies_by_network_once_its_socket_leads_to_the
             assert far == near
 
 
+async def test_a_process_that_hears_of_a_recorder_sends_it_pictures_at_once(
+    place: Place, short_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("backbone.bus.host_copies.LOOK_EACH_S", 1e6)  # it would not look again in this test
+    source, near = place.join(SERVER), Recording()
+    source.copies = HostCopies(short_path)
+    async with recorder_of_host(short_path, near, is_of_mission=True):
+        far = await listening(place)
+        await until(lambda: knows_listener(source), "the listener is known")
+        for conversation in (Conversation.FRAMES, Conversation.BODIES):
+            source.publish(SERVER, conversation, News(1))
+        await source.close()
+        await until(lambda: len(near) == 2, "both came by the socket")
+        assert far == []
+
+
 async def test_when_its_recorder_ends_a_process_sends_its_copies_by_network(place: Place, short_path: Path) -> None:
     far, near = await listening(place), Recording()
     source = place.join(SERVER)
