@@ -235,7 +235,7 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
         raise FileUnusable(f"{error.filename or to}: {error.strerror or error}") from error
     with opened(to) as made:
         assert made.contents().messages == done.messages  # noqa: S101  what was written can be read
-    without = f", without those of {counted(done.damaged, 'damaged chunk')}" if done.damaged else ""
+    without = f", without {counted(done.damaged, 'damaged part')} of {path}" if done.damaged else ""
     unread = f"; the last {counted(done.unread_bytes, 'byte')} of {path} cannot be read" if done.unread_bytes else ""
     say(f"{to}: {counted(done.messages, 'message')}{without}{unread}")
     return ExitCode.DONE

@@ -1,21 +1,27 @@
 """Recovering: writes the readable messages of a damaged recording, or of a killed recorder, to a whole recording.
 
-Rules of this file: a damaged chunk costs its own messages alone, and is counted. Chunks are found by the index. Without
-one, of a file that is cut, or damaged between two chunks, the messages before that place are kept, and the command
-prints the length of the rest.
+Rules of this file: a damaged chunk costs its own messages alone, and is counted. The facts about the mission and the
+mission file cost themselves alone, too, if their own lengths are whole. Chunks are found by the index. Without one, of
+a file that is cut, or damaged between two records, the messages before that place are kept, and the command prints the
+length of the rest.
 """
 
 from __future__ import annotations
 
+import io
 import os
+import struct
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
+from mcap.data_stream import RecordBuilder
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import MAGIC_SIZE, StreamReader, breakup_chunk
 from mcap.summary import Summary
 from mcap.writer import CompressionType, Writer
 
@@ -23,6 +29,8 @@ from backbone.recording.reader import DAMAGED, MOST_RECORD_BYTES, NoRecording, N
 from backbone.recording.writer import CHUNK_BYTES, PROFILE
 
 _OTHER_PROFILES = {"", "ros1", "ros2", "px4"}  # none, and the well-known ones of the MCAP specification
+_BEGIN = struct.Struct("<BQ")  # MCAP specification: the kind and the length of a record
+_FACTS = (Opcode.METADATA, Opcode.ATTACHMENT)
 _CHUNK_BYTES = 49  # MCAP specification, op 0x06: all but the compression's name and the records
 
 
@@ -31,7 +39,7 @@ class Recovered(NamedTuple):
 
     Attributes:
         messages: Number of messages in the new recording.
-        damaged: Number of chunks, of some 250 kB, whose messages cannot be read.
+        damaged: Number of parts that cannot be read: chunks, of some 250 kB, the facts, or the mission file.
         unread_bytes: Length of the end of the file, after the last place at which it can be read; 0: read to its end.
     """
 
@@ -89,14 +97,16 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
         return Recovered(whole.messages, lost, 0)
     read_to = damaged.seek(0)
     try:
-        for record in _records(damaged, skip_magic=False):
+        for record in _each_record(damaged):
             has_begun, has_all = True, has_all or isinstance(record, DataEnd)
-            if isinstance(record, Chunk):
+            if record is None:
+                lost += 1
+            elif isinstance(record, Chunk):
                 lost += not _took_chunk(whole, record)
             else:
                 whole.take(record)
             read_to = read_to + _size(record) if isinstance(record, Chunk) else damaged.tell()
-        read_to = damaged.tell()  # after the last record stand 8 bytes more
+        read_to = damaged.tell()  # also after the footer and the magic
     except DAMAGED as error:
         if not has_begun:
             why = str(error) or "it is too short"
@@ -110,16 +120,19 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
 
 
 def _take_by_index(whole: _WholeRecording, damaged: IO[bytes], index: Summary) -> int:
-    """Take all that the index names; return how many chunks could not be read, or not in full."""
+    """Take all that the index names; return how many parts could not be read, or not in full."""
     for name in (*index.schemas.values(), *index.channels.values()):  # those of a damaged chunk too
         with suppress(LookupError):
             whole.take(name)
-    reader = SeekingReader(damaged, record_size_limit=MOST_RECORD_BYTES)
-    for others in (reader.iter_metadata, reader.iter_attachments):
-        with suppress(*DAMAGED):
-            for other in others():
-                whole.take(other)
     lost = 0
+    places = [(one.offset, one.length) for one in index.metadata_indexes]
+    places += [(one.offset, one.length) for one in index.attachment_indexes]
+    for place, length in places:
+        damaged.seek(place)
+        found = _facts(damaged.read(min(length, MOST_RECORD_BYTES)))
+        if found is not None:
+            whole.take(found)
+        lost += found is None
     for place in sorted(one.chunk_start_offset for one in index.chunk_indexes):
         damaged.seek(place)
         try:
@@ -128,6 +141,40 @@ def _take_by_index(whole: _WholeRecording, damaged: IO[bytes], index: Summary) -
             chunk = None
         lost += not (isinstance(chunk, Chunk) and _took_chunk(whole, chunk))
     return lost
+
+
+def _each_record(file: IO[bytes]) -> Iterator[McapRecord | None]:
+    """Yield the records; None: facts that cannot be read, in which the library would lose its place."""
+    first = next(_records(file, skip_magic=False))
+    yield first
+    while True:
+        at = file.tell()
+        kind, length = _BEGIN.unpack(file.read(_BEGIN.size))
+        file.seek(at)
+        if kind in _FACTS and length < MOST_RECORD_BYTES:
+            data = file.read(_BEGIN.size + length)
+            if len(data) < _BEGIN.size + length:
+                raise EndOfFile
+            yield _facts(data)
+            continue
+        record = next(_records(file, skip_magic=True))
+        if isinstance(record, Footer):
+            file.read(MAGIC_SIZE)
+            return
+        yield record
+
+
+def _facts(data: bytes) -> Metadata | Attachment | None:
+    """Return the facts in a record; None: written again they would be other bytes, so these are damaged."""
+    try:
+        record = next(_records(io.BytesIO(data), skip_magic=True), None)
+    except DAMAGED:
+        return None
+    if not isinstance(record, Metadata | Attachment):
+        return None
+    again = RecordBuilder()
+    record.write(again)
+    return record if again.end() == data else None  # type: ignore[no-untyped-call]
 
 
 def _records(file: IO[bytes], *, skip_magic: bool) -> Iterator[McapRecord]:
