@@ -115,6 +115,8 @@ async def decide_anew(path: Path, since_s: float, rules: dict[str, Any], *, as_j
     say(f"{made}: {'all as recorded' if found.difference is None else 'the last one is not as recorded'}")
     if found.missing:
         say(f"not compared, because incomplete in the recording: {counted(found.missing, 'decision')}")
+    if found.unread:
+        say(f"incomplete: {counted(found.unread, 'message')} of another form cannot be read")
     return ExitCode.DONE if found.difference is None else ExitCode.REFUSED
 
 

@@ -19,12 +19,13 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import Decided, ScheduleSnapshot, TraceLine
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.revival import Reviver, revived
+from backbone.recording.revival import Reviver
 from backbone.scheduling import snapshot
 from backbone.scheduling.events import Event, Instruction, Record, Woken
 from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.spoken import counted
 
 _DECISIONS = tuple(f"{RC_MANAGER}/{conversation}" for conversation in (Conversation.DECISIONS, Conversation.ASK))
 
@@ -127,12 +128,14 @@ class DecisionComparison:
         grants: Number of grants among their lines.
         missing: Number of decisions that could not be compared, because the recording lacks the event or lines.
             The last one is not counted if only the recording's end can have cut it off.
+        unread: Number of messages of another form or version, which are left out.
         difference: The first difference; None: all decisions are equal.
     """
 
     decisions: int = 0
     grants: int = 0
     missing: int = 0
+    unread: int = 0
     difference: OtherDecision | None = None
 
 
@@ -142,7 +145,7 @@ class _RecordedDecision:
 
     Attributes:
         last: Number of the RC manager's message with its last line.
-        heard: Numbers of all its messages, from the event to the first message of the next decision.
+        heard: Numbers of all its readable messages, from the event to the first message of the next decision.
         is_last: Whether no other decision follows in the recording, which may have ended before its last line.
     """
 
@@ -169,12 +172,13 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
         NotRecorded: The recording has no snapshot after ``since_s``, or rules were given and the begin is missing.
         NoSuchRule: The scheduler has no rule of this name, or the rule has no such value.
         WrongPlanner: The planner among the rules is not a planner.
-        NoSnapshot, OtherForm: The recording is of another release.
+        NoSnapshot: The recording is of another release.
     """
-    found = DecisionComparison()
+    found, reviver = DecisionComparison(), Reviver()
     anew: _Anew | None = None
     number, began = 0, False
-    for step in _steps(recording, since_s):
+    for step in _steps(recording, since_s, reviver):
+        found.unread = reviver.unread
         if isinstance(step, ScheduleSnapshot):
             if anew is None or step.number == 0:
                 anew, number, began = _Anew(step, rules), step.number, True
@@ -203,7 +207,8 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
             found.difference = OtherDecision(number, step.decided.at_s, step.decided.event, recorded, decided)
             return found
     if not began:
-        raise NotRecorded("the recording has no state of the schedule")
+        without = f", without {counted(reviver.unread, 'message')} of another form" if reviver.unread else ""
+        raise NotRecorded(f"the recording has no state of the schedule{without}")
     if anew is not None and rules:
         last_s = max(message.at_s for message in recording.messages(source=RC_MANAGER))
         found.difference = anew.of_itself(number + 1, last_s)
@@ -257,12 +262,12 @@ def _first(begin: ScheduleSnapshot, rules: dict[str, Any]) -> ScheduleManager:
     return manager.begun_anew(chosen, load_planner(chosen.planner))
 
 
-def _steps(recording: Recording, since_s: float) -> Iterator[ScheduleSnapshot | _RecordedDecision]:
+def _steps(recording: Recording, since_s: float, reviver: Reviver) -> Iterator[ScheduleSnapshot | _RecordedDecision]:
     """Yield the snapshots, and the decisions with their lines."""
     step: _RecordedDecision | None = None
     for message in _in_order(recording.messages(since_s=since_s, source=RC_MANAGER)):
-        told = _told(message)
-        if step is not None:
+        unread, told = reviver.unread, reviver.revived(message, Decided, ScheduleSnapshot, TraceLine)
+        if step is not None and reviver.unread == unread:
             step.heard.append(message.sequence)
             if isinstance(told, ScheduleSnapshot | Decided):
                 yield step
@@ -284,15 +289,3 @@ def _in_order(messages: Iterable[Recorded]) -> Iterator[Recorded]:
     """Yield the messages of one sender in the order of their numbers, also if they have the same time."""
     for _at_s, together in groupby(messages, lambda message: message.at_s):
         yield from sorted(together, key=lambda message: message.sequence)
-
-
-def _told(message: Recorded) -> Decided | ScheduleSnapshot | TraceLine | None:
-    """Return the message if it is about decisions, else None."""
-    match message.schema:
-        case "Decided/1":
-            return revived(Decided, message.body)
-        case "ScheduleSnapshot/1":
-            return revived(ScheduleSnapshot, message.body)
-        case "TraceLine/2":
-            return revived(TraceLine, message.body)
-    return None

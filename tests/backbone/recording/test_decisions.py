@@ -9,6 +9,7 @@ from functools import cache
 from random import Random
 from typing import Any
 
+import msgspec
 import pytest
 from examples import share, some
 
@@ -23,13 +24,14 @@ from backbone.recording.hearing import to_overhear
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.reasons import reasons_at
-from backbone.recording.revival import revived
+from backbone.recording.revival import message_as_sent, revived
 from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.events import Woken
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.fairness import Turns
 from backbone.scheduling.own_planner import WrongPlanner
 from backbone.scheduling.views import Schedule, Why
+from backbone.wire import WIRE_VERSION, Envelope, write
 from mission_control.laboratory.simulation import mission_run
 from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
 from mission_control.laboratory.simulation.shape import draw_shape
@@ -152,6 +154,29 @@ def test_what_is_missing_is_counted_and_no_difference(recorded: RecordMission):
     found = [decided_anew(recorded(seed, lost)) for seed in (1, 2, 3)]
     assert all(one.difference is None for one in found)
     assert sum(one.missing for one in found) > 0
+
+
+@pytest.mark.parametrize("body", [["of another release"], None])
+@pytest.mark.parametrize("schema", ["TraceLine/2", "TraceLine/9", "Decided/1", "Decided/9"])
+def test_a_message_of_another_form_is_counted_and_no_difference(
+    recorded: RecordMission, schema: str, body: list[str] | None
+):
+    file, number = io.BytesIO(), 0
+    writer = RecordingWriter(file, CLASSES, {})
+    for one in recorded(1).messages():
+        said = message_as_sent(CLASSES, one)
+        assert said is not None
+        raw = write(Envelope(WIRE_VERSION, one.source, one.sequence, one.at_s, one.cause, said))
+        if one.schema.partition("/")[0] == schema.partition("/")[0]:
+            number += 1
+            if number % 7 == 0:
+                raw = msgspec.msgpack.encode([WIRE_VERSION, one.source, one.sequence, one.at_s, "", [schema, body]])
+        writer.write(one.key, raw, one.at_s)
+    writer.finish()
+    found = decided_anew(Recording(file))
+    assert (found.difference, found.unread) == (None, number // 7)
+    assert found.missing > 0
+    assert found.decisions > 0
 
 
 @pytest.mark.parametrize(("seed", "most"), some([(2, 37), *((1, most) for most in range(100, 110))]))
