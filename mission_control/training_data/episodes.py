@@ -3,7 +3,7 @@
 An episode is the time in which one ARC held the robot under one epoch, according to the robot's RC; the holder at the
 recording's begin is that of the first schedule. It begins with the first step at which each camera has sent a picture
 and the robot has reported all its readings. A step has the newest data sent before it, so it contains nothing that the
-commander could not know.
+commander could not know. An episode ends at a message of the robot, or a picture, that this release cannot read.
 
 Source: a step (observation and present action) has the form of LeRobot's steps, see ``lerobot_dataset``.
 """
@@ -15,20 +15,23 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from backbone.component.messages import ComponentState
+from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import Connect, Connected, Disconnected, RcState
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recorded
-from backbone.recording.revival import revived
+from backbone.recording.revival import Reviver
 from backbone.scheduling.requests import Holder
 from backbone.scheduling.views import Schedule
-from backbone.wire import schema_of
+from backbone.wire import Message, schema_of
 from resource_pool.arc_client import Applied, Frame, Halt, Readings
 
 ACTION = ("forward_m_s", "turn_rad_s")
 OWN_CAMERA = "camera"
 """Name of the camera whose pictures have the address of the ARC; further ones are named by their role."""
 STILL = (0.0, 0.0)
+_FRAME = schema_of(Frame)
+_FOLLOWED = (Connect, Connected, Disconnected, RcState, Schedule, Presence, Readings, Applied)
 
 
 @dataclass
@@ -43,6 +46,7 @@ class Survey:
         sizes_px: Camera → width and height of its first picture.
         owners: ARC → address of its decision process.
         users: Address of a console → name of its user.
+        unread: Number of messages of another form or version, which are left out.
     """
 
     kind: str = ""
@@ -52,6 +56,7 @@ class Survey:
     sizes_px: dict[str, tuple[int, int]] = field(default_factory=dict)
     owners: dict[str, str] = field(default_factory=dict)
     users: dict[str, str] = field(default_factory=dict)
+    unread: int = 0
 
     def commander(self, arc: str) -> str:
         """Return the name of the person or behavior that owns the ARC; empty: not known."""
@@ -93,25 +98,28 @@ def keys_of(robot: str) -> tuple[str, ...]:
 
 def survey(messages: Iterable[Recorded], robot: str) -> Survey:
     """Return the data of a robot in these messages."""
-    found, its = Survey(), address(Subsystem.RESOURCE_POOL, robot)
+    found, reviver, its = Survey(), Reviver(), address(Subsystem.RESOURCE_POOL, robot)
     for message in messages:
-        match message.schema:
-            case _Schema.SCHEDULE:
-                schedule = revived(Schedule, message.body)
+        if message.schema == _FRAME:
+            body = _fields(message)
+            if body.get("arc") in found.arcs:
+                found.sizes_px.setdefault(_camera(message.key), (body["width_px"], body["height_px"]))
+            continue
+        match reviver.revived(message, *_FOLLOWED, ComponentState, Frame):
+            case Schedule() as schedule:
                 found.owners.update((request.arc, request.owner) for request in schedule.requests)
                 found.robots.update(rc.rc for rc in schedule.rcs if rc.is_robot)
                 found.arcs.update(holder.arc for holder in _holders(schedule, robot))
                 found.kind = next((rc.kind for rc in schedule.rcs if rc.rc == robot), found.kind)
-            case _Schema.STATE if (state := revived(ComponentState, message.body)).user:
-                found.users[state.address] = state.user
-            case _Schema.RC_STATE if message.source == its:
-                found.arcs.update(holder.arc for holder in revived(RcState, message.body).holders)
-            case _Schema.CONNECT if _address_in(message.key) == its:
-                found.arcs.add(revived(Connect, message.body).arc)
-            case _Schema.READINGS if message.source == its:
-                found.reports.update(dict.fromkeys(revived(Readings, message.body).values))
-            case _Schema.FRAME if (body := _fields(message)).get("arc") in found.arcs:
-                found.sizes_px.setdefault(_camera(message.key), (body["width_px"], body["height_px"]))
+            case ComponentState(user=user, address=at) if user:
+                found.users[at] = user
+            case RcState(holders=holders) if message.source == its:
+                found.arcs.update(holder.arc for holder in holders)
+            case Connect(arc=arc) if _address_in(message.key) == its:
+                found.arcs.add(arc)
+            case Readings(values=values) if message.source == its:
+                found.reports.update(dict.fromkeys(values))
+    found.unread = reviver.unread
     return found
 
 
@@ -125,6 +133,7 @@ class Follower:
 
     def __init__(self, robot: str, reports: Iterable[str], cameras: Iterable[str], rate_hz: int) -> None:
         self.grants = self.episodes = 0
+        self._reviver = Reviver()
         self._its = address(Subsystem.RESOURCE_POOL, robot)
         self._reports, self._cameras, self._rate_hz = tuple(reports), frozenset(cameras), rate_hz
         self._robot = robot
@@ -158,39 +167,50 @@ class Follower:
             self._number += 1
 
     def _take(self, message: Recorded) -> None:
-        match message.schema:
-            case _Schema.CONNECT if _address_in(message.key) == self._its:
-                self._asked = revived(Connect, message.body)
-            case _Schema.SCHEDULE if not self._is_holder_known:
+        is_its = self._its in (message.source, _address_in(message.key))
+        if message.key.endswith(f"/{Conversation.FRAMES}"):
+            self._take_picture(message)
+            return
+        unread, told = self._reviver.unread, self._reviver.revived(message, *_FOLLOWED)
+        if is_its and self._reviver.unread > unread:
+            self._end()
+        match told:
+            case Connect() if is_its:
+                self._asked = told
+            case Schedule() if not self._is_holder_known:
                 self._is_holder_known = True  # the RC publishes each later grant
-                for holder in _holders(revived(Schedule, message.body), self._robot):
+                for holder in _holders(told, self._robot):
                     self._begin(holder.arc, holder.epoch)
-            case _Schema.FRAME if self._arc and _fields(message).get("arc") == self._arc:
-                self._pictures[_camera(message.key)] = revived(Frame, message.body)
+            case Presence(alive=False) if is_its:
+                self._end()
             case _ if message.source == self._its:
-                self._heard_itself(message)
-            case _Schema.PRESENCE if _address_in(message.key) == self._its and not _fields(message).get("alive"):
-                self._end()
+                self._heard_itself(told)
 
-    def _heard_itself(self, message: Recorded) -> None:
-        """Process a message of the robot's RC, because only the RC knows the present holder."""
-        match message.schema:
-            case _Schema.CONNECTED:
-                epoch = revived(Connected, message.body).epoch
-                if self._asked is not None and self._asked.epoch == epoch:
-                    self._begin(self._asked.arc, epoch)
-            case _Schema.DISCONNECTED:
+    def _take_picture(self, message: Recorded) -> None:
+        if self._arc and _fields(message).get("arc", self._arc) == self._arc:
+            picture = self._reviver.revived(message, Frame)
+            if picture is None:
                 self._end()
-            case _Schema.RC_STATE:
-                holders = {one.epoch: one.arc for one in revived(RcState, message.body).holders}
+            else:
+                self._pictures[_camera(message.key)] = picture
+
+    def _heard_itself(self, told: Message | None) -> None:
+        """Process a message of the robot's RC, because only the RC knows the present holder."""
+        match told:
+            case Connected(epoch=epoch) if self._asked is not None and self._asked.epoch == epoch:
+                self._begin(self._asked.arc, epoch)
+            case Disconnected():
+                self._end()
+            case RcState():
+                holders = {one.epoch: one.arc for one in told.holders}
                 if self._epoch not in holders:
                     self._end()
                 for epoch, arc in holders.items():
                     self._begin(arc, epoch)
-            case _Schema.READINGS:
-                self._values.update((name, float(v)) for name, v in revived(Readings, message.body).values.items())
-            case _Schema.APPLIED:
-                self._applied(revived(Applied, message.body))
+            case Readings():
+                self._values.update((name, float(v)) for name, v in told.values.items())
+            case Applied():
+                self._applied(told)
 
     def _applied(self, told: Applied) -> None:
         if told.epoch != self._epoch:
@@ -211,15 +231,6 @@ class Follower:
         self._is_holder_known = True
         self._arc, self._epoch, self._begin_s, self._number = "", 0, None, 0
         self._action, self._pictures = STILL, {}
-
-
-class _Schema:
-    """Names of schemas, for patterns."""
-
-    APPLIED, FRAME, READINGS = schema_of(Applied), schema_of(Frame), schema_of(Readings)
-    CONNECT, CONNECTED, DISCONNECTED = schema_of(Connect), schema_of(Connected), schema_of(Disconnected)
-    RC_STATE, STATE, SCHEDULE = schema_of(RcState), schema_of(ComponentState), schema_of(Schedule)
-    PRESENCE = schema_of(Presence)
 
 
 def _fields(message: Recorded) -> dict[str, Any]:

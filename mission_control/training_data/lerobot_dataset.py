@@ -322,7 +322,10 @@ class DataSet:
             writer.close()
         said = f"{counted(len(writer.episodes), 'episode')} with {counted(writer.rows, 'step')}"
         left_out = self.follower.grants - self.follower.episodes
-        return f"{said}; {counted(left_out, 'grant')} without pictures of each camera left out" if left_out else said
+        if left_out:
+            said = f"{said}; {counted(left_out, 'grant')} without pictures of each camera left out"
+        unread = self.form.found.unread
+        return f"{said}; incomplete: {counted(unread, 'message')} of another form cannot be read" if unread else said
 
 
 def data_set(recording: Recording, robot: str, rate_hz: int, task: str, *, with_pictures: bool) -> DataSet:
@@ -331,7 +334,6 @@ def data_set(recording: Recording, robot: str, rate_hz: int, task: str, *, with_
     Raises:
         NoEpisodes: The recording has no step of the robot.
         NoRecording: The recording is damaged.
-        OtherForm: The recording was made by another release.
     """
     found = survey(recording.messages(keys_of(robot)), robot)
     form = Form(found, tuple(sorted(found.sizes_px)) if with_pictures else (), rate_hz, task)

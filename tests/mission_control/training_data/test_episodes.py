@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from driven_robot import ARCS, connected, disconnected, halted, holding, known, moved, reported, seen
@@ -177,3 +179,15 @@ def test_each_camera_has_a_name_and_an_episode_needs_all() -> None:
     assert found.sizes_px == {OWN_CAMERA: (4, 2), "pan": (2, 2)}
     assert (follower.grants, follower.episodes, len(steps)) == (2, 1, 8)
     assert {name: frame.pixels[0] for name, frame in steps[0].pictures.items()} == {OWN_CAMERA: 10, "pan": 20}
+
+
+@pytest.mark.parametrize("other", [{"body": {}}, {"schema": "Applied/99"}])
+def test_an_episode_ends_at_a_message_of_another_form_which_is_counted(other: dict[str, Any]) -> None:
+    said = [*connected(1.0, DRIVE, 7), moved(1.5, 7, 0.5, 0.0), holding(2.0, DRIVE, 7), moved(2.05, 7, 0.1, 0.0)]
+    read = Recording(recorded([*known(0.1), *said, reported(3.0)])).messages(keys_of("scout1"))
+    messages = [replace(one, **other) if one.at_s == 1.5 else one for one in read]
+    found, follower = survey(messages, "scout1"), Follower("scout1", [], [], RATE_HZ)
+    steps = list(follower.follow(messages))
+    assert found.unread == 1
+    assert [step.at_s for step in steps if step.episode == 0] == pytest.approx([1.0, 1.1, 1.2, 1.3, 1.4])
+    assert [step.action for step in steps if step.episode == 1] == [STILL, *[(0.1, 0.0)] * 9]
