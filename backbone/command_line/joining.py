@@ -41,7 +41,7 @@ def _opened(path: Path, stack: ExitStack) -> Recording:
     except OSError as error:
         raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
     except NoRecording as error:
-        raise type(error)(f"{path}: {error.detail}") from error
+        raise type(error)(f"{path}: {error.detail}", remedy=error.remedy) from error
 
 
 def clock_lines(clocks: ClockOffsets) -> Iterator[str]:

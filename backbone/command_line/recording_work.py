@@ -44,7 +44,7 @@ from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.host_ear import HostEar
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import Recording, missing_numbers, open_file
+from backbone.recording.reader import NoRecording, Recording, missing_numbers, open_file
 from backbone.recording.recorder import Recorder
 from backbone.recording.recovering import recover_file
 from backbone.recording.revival import Reviver
@@ -365,4 +365,8 @@ def opened(path: Path) -> Iterator[Recording]:
     except OSError as error:
         raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
     with file, interruptible():
-        yield Recording(file)
+        try:
+            recording = Recording(file)
+        except NoRecording as error:
+            raise type(error)(f"{path}: {error.detail}", remedy=error.remedy) from error
+        yield recording

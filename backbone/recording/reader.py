@@ -28,8 +28,10 @@ from backbone.recording.writer import ABOUT, NS, PROFILE
 
 MOST_RECORD_BYTES = 64 * 1024 * 1024  # chosen: eight times the largest message; a damaged length asks for terabytes
 ROOM = 20  # chosen: twice the calls from a command's loop over messages to the encoder of JSON
+NOTHING_OF_ONE = "Name a recording; this file has nothing of one."
 DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
 Decoded = TypeVar("Decoded")
+_MAGIC = b"\x89MCAP0\r\n"  # MCAP specification: the begin of every file
 _END = struct.Struct("<BQQQI8x")  # MCAP specification, op 0x02 and the magic: the end of every whole file
 
 
@@ -37,7 +39,7 @@ class NoRecording(Refusal):
     """The file is not a recording, or its end is missing."""
 
     code = "recording.unreadable"
-    remedy = "If its recorder was killed: scout-backbone record recover FILE TO."
+    remedy = "End its recorder if it still runs. If it was killed: scout-backbone record recover FILE TO."
 
 
 class NotOfMessages(NoRecording):
@@ -119,6 +121,10 @@ class Recording:
     """
 
     def __init__(self, file: IO[bytes]) -> None:
+        file.seek(0)
+        if file.read(len(_MAGIC)) != _MAGIC:
+            why = "it begins as another kind of file" if file.tell() else "the file is empty"
+            raise NoRecording(f"no recording: {why}", remedy=NOTHING_OF_ONE)
         try:
             check_index(file)
             self._reader = SeekingReader(file, validate_crcs=True, record_size_limit=MOST_RECORD_BYTES)

@@ -25,7 +25,15 @@ from mcap.stream_reader import MAGIC_SIZE, StreamReader, breakup_chunk
 from mcap.summary import Summary
 from mcap.writer import CompressionType, Writer
 
-from backbone.recording.reader import DAMAGED, MOST_RECORD_BYTES, NoRecording, NotOfMessages, check_index, open_file
+from backbone.recording.reader import (
+    DAMAGED,
+    MOST_RECORD_BYTES,
+    NOTHING_OF_ONE,
+    NoRecording,
+    NotOfMessages,
+    check_index,
+    open_file,
+)
 from backbone.recording.writer import CHUNK_BYTES, PROFILE
 
 _OTHER_PROFILES = {"", "ros1", "ros2", "px4"}  # none, and the well-known ones of the MCAP specification
@@ -110,9 +118,7 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
     except DAMAGED as error:
         if not has_begun:
             why = str(error) or "it is too short"
-            raise NoRecording(
-                f"no recording: {why}", remedy="Name a recording; this file has nothing of one."
-            ) from error
+            raise NoRecording(f"no recording: {why}", remedy=NOTHING_OF_ONE) from error
         read_to = damaged.seek(0, os.SEEK_END) if has_all else read_to  # the index follows; it is written again
     whole.finish()
     size = damaged.seek(0, os.SEEK_END)  # only now: its recorder may still write it

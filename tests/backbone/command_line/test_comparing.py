@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import pytest
 from small_recordings import SCOUT, Said, recorded
@@ -14,7 +15,7 @@ from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
 from backbone.recording.comparison import KeyComparison, NumberError, compared
-from backbone.recording.reader import Recording
+from backbone.recording.reader import NoRecording, Recording
 
 OTHER = "resource_pool/scout2"
 
@@ -55,3 +56,12 @@ def test_differences_too_large_for_a_number_are_json() -> None:
     assert json.loads(shown[0], parse_constant=pytest.fail)["errors"] == {
         "x_m": {"rms": None, "largest": None, "count": 3}
     }
+
+
+async def test_of_two_files_the_one_that_is_no_recording_is_named(tmp_path: Path) -> None:
+    good, bad = tmp_path / "good.mcap", tmp_path / "bad.mcap"
+    good.write_bytes(recorded([]).getvalue())
+    bad.touch()
+    with pytest.raises(NoRecording, match=r"bad\.mcap: no recording: the file is empty") as refused:
+        await comparing.compare(good, bad, (), {}, as_json=False)
+    assert "recover" not in refused.value.remedy

@@ -68,7 +68,7 @@ def test_what_cannot_be_joined_is_refused_and_leaves_no_file(off: Path) -> None:
         damaged.write_bytes(content)
         with pytest.raises(NoRecording) as refused:
             asyncio.run(join_to([off, damaged], to))
-        assert "record recover" in refused.value.remedy
+        assert ("record recover" in refused.value.remedy) == (content != b"nothing")
         assert not to.exists()
     with pytest.raises(FileUnusable, match=r"off\.mcap exists"):
         asyncio.run(join_to([off], off))

@@ -127,20 +127,20 @@ def test_of_a_damaged_file_facts_and_mission_file_are_read_or_refused(data: st.D
 
 @pytest.mark.parametrize("data", [b"", b"RIFF" * 100, bytes(1000)])
 def test_what_is_no_recording_is_refused_with_a_remedy(data: bytes) -> None:
-    with pytest.raises(NoRecording) as refused:
-        Recording(io.BytesIO(data))
-    assert "recover" in refused.value.remedy
-    with pytest.raises(NoRecording) as refused:
-        recover(io.BytesIO(data), io.BytesIO())
-    assert "recover" not in refused.value.remedy
+    for use in (Recording, lambda file: recover(file, io.BytesIO())):
+        with pytest.raises(NoRecording, match="no recording") as refused:
+            use(io.BytesIO(data))
+        assert "recover" not in refused.value.remedy, "recovering it is refused as well"
 
 
 def test_an_unfinished_recording_names_the_remedy_and_recovers(tmp_path: Path) -> None:
     data, _ = recorded([0, 1, 0], frozenset({2}), whole=False)
     broken, whole = tmp_path / "broken.mcap", tmp_path / "whole.mcap"
     broken.write_bytes(data)
-    with broken.open("rb") as file, pytest.raises(NoRecording):
+    with broken.open("rb") as file, pytest.raises(NoRecording) as refused:
         Recording(file)
+    assert "still runs" in refused.value.remedy
+    assert "record recover" in refused.value.remedy
     assert recover_file(broken, whole).messages == 3
     with whole.open("rb") as file:
         recording = Recording(file)
