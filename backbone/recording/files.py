@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 from collections import deque
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import IO
 
@@ -41,21 +43,21 @@ class RecordingFiles:
         """Whether the open file was deleted; then all that is written to it is lost."""
         return not self.file.closed and os.fstat(self.file.fileno()).st_nlink == 0
 
-    def open_next(self) -> None:
-        """Close the file and open the next one; names of existing files are skipped.
+    def open_next(self) -> Callable[[], None]:
+        """Open the next file; names of existing files are skipped.
+
+        Returns:
+            A function that closes the file before, see ``close``. It may take seconds; call it from any thread.
 
         Raises:
-            OSError: The next file cannot be written; the file before stays closed.
+            OSError: The next file cannot be written; the file before stays open.
         """
-        self.close()
-        self.file = self._open()
+        before, self.file = self.file, self._open()
+        return partial(_close, before)
 
     def close(self) -> None:
         """Close the file, after its content is on the disc."""
-        if not self.file.closed:
-            self.file.flush()
-            os.fsync(self.file.fileno())
-            self.file.close()
+        _close(self.file)
 
     def _open(self) -> IO[bytes]:
         while True:
@@ -74,3 +76,10 @@ class RecordingFiles:
 
     def _named(self, number: int) -> Path:
         return self._first if number == 1 else self._first.with_stem(f"{self._first.stem}-{number}")
+
+
+def _close(file: IO[bytes]) -> None:
+    if not file.closed:
+        file.flush()
+        os.fsync(file.fileno())
+        file.close()

@@ -38,7 +38,7 @@ from backbone.recording.presence import Presence
 from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
-from backbone.waiting import set_within
+from backbone.waiting import in_thread_within, set_within
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
 FLUSH_EACH_S = 0.25  # chosen: a killed recorder may lose half a second, on a busy machine too; seconds of the machine
@@ -110,6 +110,7 @@ class Recorder:
         self._bug: BaseException | None = None
         self._one_at_a_time, self._needs_snapshot = asyncio.Lock(), asyncio.Event()
         self._ended = asyncio.Event()
+        self._closing: dict[asyncio.Task[None], None] = {}
         self._has_link, self._is_back = True, asyncio.Event()
         self.was_started_again = False
         """True: it ended because a later mission of the same name is up."""
@@ -160,6 +161,7 @@ class Recorder:
             comparing.cancel()
             await asyncio.wait({asking, comparing})
             await self._hear_the_last()
+            await asyncio.gather(*self._closing)
             if self._ear is not None:
                 await self._ear.close()
             self._finish()
@@ -231,12 +233,21 @@ class Recorder:
 
     def _split(self) -> None:
         self._writer.finish()
-        self._files.open_next()
+        closing = asyncio.create_task(self._close(self._files.open_next()), name="closes a file")
+        self._closing[closing] = None
+        closing.add_done_callback(self._closing.pop)
         self._before, self._begun_s = self._before + self._writer.written, self._clock.now_s()
         self._writer = self._new_writer()
         self._needs_snapshot.set()
         for address in tuple(self._present):  # each file states the present components and their states
             self._alive_changed(address, alive=True)
+
+    async def _close(self, close: Callable[[], None]) -> None:
+        """Close a file in a thread, because a slow disc takes seconds for it, and meanwhile messages arrive."""
+        try:
+            await in_thread_within(close, None)
+        except OSError as error:
+            self._fill(str(error))
 
     def _new_writer(self) -> RecordingWriter:
         return RecordingWriter(self._files.file, *self._facts)

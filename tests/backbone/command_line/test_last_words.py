@@ -45,8 +45,8 @@ def test_a_detached_mission_does_not_tell_of_keys_that_nobody_can_press() -> Non
 def test_the_oldest_file_that_is_left_is_known(tmp_path: Path) -> None:
     files = RecordingFiles(tmp_path / "night.mcap", keep=2)
     assert files.oldest == tmp_path / "night.mcap"
-    files.open_next()
-    files.open_next()
+    files.open_next()()
+    files.open_next()()
     files.close()
     assert files.oldest == tmp_path / "night-2.mcap"
     assert files.oldest.exists()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import io
+import os
 import shutil
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +14,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from backbone.addresses import NAMESERVER
-from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.clock import MissionClock, VirtualClock, run_virtual
 from backbone.component.messages import (
     AskParameters,
     AskState,
@@ -93,6 +95,38 @@ def test_only_keys_that_are_meant_are_recorded(recorded: Callable[..., list[Reco
         bus.publish("resource_pool/scout2", Conversation.EVENTS, event(3))
 
     assert [one.body["what"] for one in recorded(scene, "resource_pool/scout2/log")] == ["event 2"]
+
+
+def test_a_slow_disc_does_not_delay_the_recorder_when_it_begins_a_further_file(
+    tmp_path: Path, local_mission: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goes_on, waited, sync = threading.Event(), list[bool](), os.fsync
+
+    def slow(number: int) -> None:
+        waited.append(goes_on.wait(5.0))
+        sync(number)
+
+    async def play() -> None:
+        clock = MissionClock.started_now()
+        async with local_mission("local") as network:
+            bus = network.join("backbone/recorder", clock)
+            files = RecordingFiles(tmp_path / "it.mcap")
+            recorder = Recorder(bus, clock, files=files, classes=CLASSES, about={}, split_s=0.0)
+            running = asyncio.create_task(recorder.run())
+            async with asyncio.timeout(30.0):
+                while not files.path.stem.endswith("-2"):  # noqa: ASYNC110  the recorder has no event of it
+                    await asyncio.sleep(0.01)
+            goes_on.set()
+            recorder.end()
+            await running
+            await bus.close()
+
+    monkeypatch.setattr(os, "fsync", slow)
+    asyncio.run(play())
+    assert all(waited), "the event loop went on while the disc was slow"
+    for name in ("it.mcap", "it-2.mcap"):
+        with (tmp_path / name).open("rb") as file:
+            Recording(file)
 
 
 def test_below_a_hundred_megabytes_it_ends_with_a_whole_file_and_says_so(
