@@ -101,6 +101,7 @@ class Recorder:
         self._split_s, self._split_bytes = split_s, split_bytes
         self._facts = classes, about, keys, mission_xml
         self._writer, self._before = self._new_writer(), 0
+        self._lost: RecordingWriter | None = None
         self._begun_s = clock.now_s()
         self._subscribed: list[Overhearing] = []
         self._present: dict[str, None] = {}
@@ -223,9 +224,10 @@ class Recorder:
         return lasted_s >= self._split_s or self._files.file.tell() >= self._split_bytes
 
     def _note_deletion(self) -> bool:
-        """Return whether the open file was deleted; if so, count its messages as lost, and log it."""
-        if self.full or not self._files.is_deleted:
+        """Return whether the open file was deleted; if so, count its messages as lost, and log it, once a file."""
+        if self._lost is self._writer or not self._files.is_deleted:
             return False
+        self._lost = self._writer
         self.deleted += self._writer.written
         lost = f"{self._files.path.name} was deleted while it was recorded to"
         self._say(f"{lost}; {counted(self._writer.written, 'message')} are lost", LogLevel.ALARM)
