@@ -254,7 +254,7 @@ class WrongParameter(Refusal):
     """A parameter of that name does not exist, or the value does not fit it."""
 
     code = "component.parameter"
-    remedy = "Ask the component for its parameters; use one of those names with a value of its type."
+    remedy = "See 'scout-backbone set NAME' for the component's parameters and values; a new value is of the same type."
 
 
 CommonQuestion = AskState | AskTime | AskStatistics | AskParameters | SetParameter | AskStory | Stop

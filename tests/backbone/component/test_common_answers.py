@@ -131,6 +131,7 @@ def test_a_parameter_that_does_not_fit_is_refused_with_the_reason(name: str, val
         with pytest.raises(WrongParameter) as refused:
             await stage.ask(SetParameter(name, value), Parameters)
         assert complaint in refused.value.detail
+        assert "See 'scout-backbone set NAME'" in refused.value.remedy
         assert stage.walker.parameters == Gait()
         stage.walker.end("enough")
         await life
