@@ -7,6 +7,7 @@ import importlib
 from backbone.component.class_faults import class_faults
 from backbone.component.component import AnyComponent, Component
 from backbone.errors import Refusal
+from backbone.import_faults import import_fault
 from backbone.shipped import is_shipped
 
 
@@ -27,7 +28,8 @@ def load_class(class_path: str) -> type[AnyComponent]:
     try:
         found = getattr(importlib.import_module(module_name), class_name)
     except (ImportError, AttributeError, ValueError) as error:
-        raise WrongClassPath(f"{class_path}: {error}", class_path=class_path) from error
+        told, remedy = import_fault(class_path, error)
+        raise WrongClassPath(told, remedy=remedy, class_path=class_path) from error
     if not (isinstance(found, type) and issubclass(found, Component)):
         raise WrongClassPath(f"{class_path} is no Component", class_path=class_path)
     # Tests have judged the shipped classes, because a judgment takes a millisecond of each start.

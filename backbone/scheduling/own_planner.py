@@ -6,7 +6,8 @@ import importlib
 import inspect
 from typing import Protocol, cast
 
-from backbone.errors import Refusal, complaint
+from backbone.errors import Refusal
+from backbone.import_faults import import_fault
 from backbone.scheduling.planner import Planner
 from backbone.scheduling.table import Table
 
@@ -44,10 +45,9 @@ def load_planner(class_path: str) -> PlannerType | None:
     module, _, name = class_path.partition(":")
     try:
         found = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise WrongPlanner(f"{class_path}: {error}", class_path=class_path) from error
     except (Exception, SystemExit) as error:  # a file that is being written raises anything
-        raise WrongPlanner(f"{class_path}: {complaint(error)}", remedy=MEND, class_path=class_path) from error
+        told, remedy = import_fault(class_path, error)
+        raise WrongPlanner(told, remedy=remedy and MEND, class_path=class_path) from error
     lacking = sorted(one for one in vars(Planner) if not one.startswith("_") and not _has(found, one))
     if lacking or not isinstance(found, type):
         raise WrongPlanner(f"{class_path} is no planner: it lacks {', '.join(lacking)}", class_path=class_path)

@@ -12,6 +12,7 @@ import msgspec
 
 from backbone.errors import Refusal, complaint
 from backbone.exchange_course import UNPROVED
+from backbone.import_faults import MEND
 from backbone.mission.arranged import CLASS, Arranged, UnitFault, UnitsQuestion
 from backbone.naming import Subsystem, address, did_you_mean
 from backbone.quality import OutputQuality, Quality
@@ -19,7 +20,6 @@ from mission_control.modules.choice import CLASS_PATH as CHOICE
 from mission_control.modules.choice import ChoiceOrder, choice_faults
 from mission_control.modules.graph import OUTSIDE, Graph, GraphRefused, Member, WiringFault
 from mission_control.modules.orders import (
-    MEND,
     ModuleOrder,
     Running,
     Source,

@@ -8,8 +8,8 @@ from typing import Annotated, TypeGuard
 
 import msgspec
 
+from backbone.import_faults import import_fault
 from backbone.keys import Conversation
-from backbone.printable_text import printable
 from backbone.quality import Quality
 from backbone.ranges import Values
 from backbone.reading_anew import WrongClass
@@ -24,9 +24,6 @@ class WrongModule(WrongClass):
 
     code = "module.class"
     remedy = "Write the class as package.module:Class, derived from mission_control.modules.module:Module."
-
-
-MEND = "Mend the file of the class, so that it can be imported."
 
 
 class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -140,9 +137,7 @@ def load_at(class_path: str) -> object:
     try:
         return operator.attrgetter(name)(importlib.import_module(file))
     except Exception as error:  # a file that is just being written may raise any exception
-        told = printable(f"{class_path}: {type(error).__name__}: {error}")
-        is_path = isinstance(error, ModuleNotFoundError) and f"{file}.".startswith(f"{error.name}.")
-        remedy = WrongModule.remedy if is_path or isinstance(error, AttributeError) else MEND
+        told, remedy = import_fault(class_path, error)
         raise WrongModule(told, remedy=remedy, class_path=class_path) from error
 
 

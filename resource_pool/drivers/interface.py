@@ -24,6 +24,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.class_faults import fault_of_method
 from backbone.component.parameter_values import parameters_from
 from backbone.errors import Refusal
+from backbone.import_faults import import_fault
 from backbone.ranges import Share
 
 Options = TypeVar("Options", bound=msgspec.Struct)
@@ -270,7 +271,8 @@ def driver_class(path: str, resource: str, protocol: type = object) -> Callable[
     try:
         found: Callable[[DriverSite], Any] = getattr(importlib.import_module(module_name), class_name)
     except (ImportError, AttributeError) as error:
-        raise UnknownDriver(f"{resource}: {path}: {error}") from error
+        told, remedy = import_fault(path, error)
+        raise UnknownDriver(f"{resource}: {told}", remedy=remedy) from error
     if not callable(found):
         raise UnknownDriver(f"{resource}: {path} is no class")
     is_judged = isinstance(found, type) and not hasattr(found, "__getattr__")  # which may pass calls on to another

@@ -75,7 +75,8 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (
             RADIO,
             "own_broken:Radio",
-            "radio cannot use this driver: radio driver: own_broken:Radio: No module named 'no_such_module'",
+            "radio cannot use this driver: radio driver: own_broken:Radio: "
+            "ModuleNotFoundError: No module named 'no_such_module' (OWN/own_broken.py, line 1)",
         ),
         (SCOUT, "resource_pool.drivers.interface:NoDevice", None),
     ],
@@ -84,7 +85,8 @@ def test_a_driver_that_cannot_work_is_refused(own: Path, before: str, driver: st
     body = [(BODY, "")] if before == SCOUT else []
     [fault] = faults_in(own, changed((before, f'{before} driver="{driver}"'), *body))
     lacks = "clip_wheel_speed, drive, halt, jump, safe, transmitter"
-    assert fault.message == (message or f"scout1 cannot use this driver: robot driver: {driver} lacks {lacks}")
+    expected = message and message.replace("OWN", str(own))
+    assert fault.message == (expected or f"scout1 cannot use this driver: robot driver: {driver} lacks {lacks}")
     assert fault.remedy
 
 
