@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 from pathlib import Path
 
+from backbone.errors import complaint
+
 CLASS_PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+
+_BROKEN = "its module cannot be imported"
 
 
 def class_path_fault(class_path: str) -> tuple[str, list[str]] | None:
@@ -33,6 +38,10 @@ def class_path_fault(class_path: str) -> tuple[str, list[str]] | None:
     source = Path(spec.origin).read_text("utf-8", errors="replace")
     if re.search(rf"\b{name}\b", source):
         return None
+    try:
+        ast.parse(source, spec.origin)
+    except (SyntaxError, ValueError) as error:  # ValueError: it has a null character
+        return f"{_BROKEN}: {complaint(error)}", []
     return f"no class {name} in {module}", re.findall(r"^class (\w+)", source, re.MULTILINE)
 
 
@@ -40,7 +49,7 @@ def class_path_remedy(class_path: str, fault: str) -> str:
     """Return the remedy for a fault that ``class_path_fault`` found."""
     if fault == f"no module {class_path.partition(':')[0].partition('.')[0]}":
         return "Correct the name, or put its folder on PYTHONPATH"
-    return "Write the class as package.module:Class"
+    return "Mend its module" if fault.startswith(_BROKEN) else "Write the class as package.module:Class"
 
 
 def _find_top(name: str) -> ModuleSpec | None:

@@ -193,3 +193,11 @@ def test_commands_and_limits_that_cannot_work_are_refused(
         return
     [fault] = faults_in(own, text)
     assert message.replace("own_table", module) in fault.message
+
+
+def test_a_class_whose_file_is_no_python_is_not_called_missing(own: Path) -> None:
+    (own / "own_slip.py").write_text("\nclass Rad:\n    def open(self:\n")
+    [fault] = faults_in(own, changed((RADIO, f'{RADIO} driver="own_slip:Radio"')))
+    assert fault.message.startswith("own_slip:Radio: its module cannot be imported: SyntaxError: ")
+    assert fault.message.endswith(f"({own}/own_slip.py, line 3)")
+    assert fault.remedy == "Mend its module"
