@@ -54,7 +54,7 @@ class AddBranch(Message, frozen=True):
         parent: The new parent behavior; the mission's name: the branch becomes a root.
         branch: Its XML: one ``<behavior>`` with all that is in it.
         source: Name of the branch's file, for faults.
-        place: Its number among its siblings, from 1; 0: the last.
+        place: Its number among its siblings, from 1 to their number and one; 0: the last.
     """
 
     version: Count

@@ -29,6 +29,7 @@ from backbone.mission.reader import read_mission_bytes
 from backbone.mission.report import Fault, MissionInvalid, Report
 from backbone.mission.tables import parameter_value
 from backbone.naming import did_you_mean
+from backbone.spoken import counted
 
 SECTION, BEHAVIOR, ARC, PARAMETER = "behaviors", "behavior", "arc", "parameter"
 
@@ -116,7 +117,7 @@ def changed(text: bytes, change: TreeChange) -> EditedFile:
     Raises:
         UnknownBehavior: The tree has no behavior of this name.
         EditRefused: The file cannot be changed so.
-        TreeInvalid: The branch is no ``<behavior>``.
+        TreeInvalid: The branch is no ``<behavior>``, or the place is beyond the end.
     """
     match change:
         case AddBranch(parent=parent, place=place):
@@ -202,9 +203,19 @@ def _path_of(whole: Element, name: str) -> Path:
 
 
 def _number(parent: Element, place: int, without: Path | None = None) -> int:
-    """Convert a place among the behaviors of the parent to a place among all its elements, with ``without`` removed."""
+    """Convert a place among the behaviors of the parent to a place among all its elements, with ``without`` removed.
+
+    Raises:
+        TreeInvalid: The place is beyond the end.
+    """
     children = [child for child in parent.children if child.path != without]
     numbers = [number for number, child in enumerate(children) if child.tag == BEHAVIOR]
     if 0 < place <= len(numbers):
         return numbers[place - 1]
+    if place > len(numbers) + 1:
+        raise TreeInvalid(
+            f"place {place} is beyond the end: {parent.text('name') or 'the mission'} has "
+            f"{counted(len(numbers), 'other behavior')}",
+            remedy=f"Write a place from 1 to {len(numbers) + 1}, or 0 for the last.",
+        )
     return numbers[-1] + 1 if numbers else len(children)

@@ -67,7 +67,7 @@ def test_a_branch_is_added_where_it_is_wanted_as_it_is_written() -> None:
     for place, expected in (
         (0, ["left", "right", "new"]),
         (1, ["new", "left", "right"]),
-        (9, ["left", "right", "new"]),
+        (3, ["left", "right", "new"]),
     ):
         after = changed(MISSION, AddBranch(0, "noon", NEW, "new.xml", place)).text
         assert shape(after) == ["day", ["morning", "noon", expected], "spare"]
@@ -135,6 +135,9 @@ def test_a_value_is_written_where_it_belongs(change: SetInTree, line: bytes) -> 
         (AddBranch(0, "nobody", NEW, "new.xml"), UnknownBehavior, "nobody"),
         (AddBranch(0, "noon", "<resource/>", "new.xml"), TreeInvalid, "new.xml:1:1"),
         (AddBranch(0, "noon", "<behavior", "new.xml"), TreeInvalid, "new.xml:1:"),
+        (AddBranch(0, "noon", NEW, "new.xml", 4), TreeInvalid, "place 4 is beyond the end: noon has 2 other behaviors"),
+        (AddBranch(0, "m", NEW, "new.xml", 77), TreeInvalid, "Write a place from 1 to 3"),
+        (MoveBranch(0, "spare", "m", 3), TreeInvalid, "place 3 is beyond the end: the mission has 1 other behavior ("),
         (SetInTree(0, "spare", "minimum_runtime_s", 5), TreeInvalid, "claims no ARC"),
         (SetInTree(0, "morning", "seconds", [1]), TreeInvalid, "seconds"),
     ],
