@@ -18,6 +18,10 @@ MARKERS = ("o", "^", "D", "v", "P", "X", "*")
 """Distinguishes series even without color."""
 GREY = "#555555"
 SIDE_BY_SIDE = 0.035  # chosen: intervals of one load are beside each other, but clearly belong together
+FORMATS = (
+    ".png",
+    ".svg",
+)  # chosen: others of the library fail after all trials, as .pgf without LaTeX
 LEAST_GAP = 4.5  # chosen: a line of text in percent of the picture's height
 
 
@@ -29,7 +33,7 @@ class NoPlotting(Refusal):
 
 
 class UnknownFormat(Refusal):
-    """The plotting library cannot write a file with this ending."""
+    """A plot is PNG or SVG."""
 
     code = "experiment.plot_format"
     remedy = "Let the file's name end with .png or .svg."
@@ -66,15 +70,14 @@ def require_plotting() -> None:
 
 
 def require_format(file: Path) -> None:
-    """Check that the plotting library can write a file of this name.
+    """Check that a plot can be written to a file of this name.
 
     Raises:
         NoPlotting: No plotting library is installed.
-        UnknownFormat: The name has no known ending.
+        UnknownFormat: The name has another ending than those of ``FORMATS``.
     """
     require_plotting()
-    known = import_module("matplotlib.figure").Figure().canvas.get_supported_filetypes()
-    if file.suffix.removeprefix(".").lower() not in known:
+    if file.suffix.lower() not in FORMATS:
         raise UnknownFormat(f"no plot can be written to {file.name!r}")
 
 

@@ -18,8 +18,10 @@ from mission_control.laboratory.experiments.plot import (
     MARKERS,
     THE_PAPERS,
     NoPlotting,
+    UnknownFormat,
     apart,
     plot,
+    require_format,
     require_plotting,
     series,
 )
@@ -92,3 +94,12 @@ def test_the_table_says_how_often_from_which_seed_and_explains_its_mark() -> Non
     assert "Surveillance: 50 trials of each condition, seed 3" in drawn
     assert "s.e. !" in drawn
     assert "beyond 3 (marked !)" in drawn
+
+
+@pytest.mark.parametrize("name", ["rates.gif", "rates.pgf", "rates.txt", "rates"])
+def test_only_the_two_formats_of_the_remedy_are_accepted(name: str) -> None:
+    pytest.importorskip("matplotlib")
+    with pytest.raises(UnknownFormat, match=r"\.png or \.svg"):
+        require_format(Path(name))
+    require_format(Path("rates.PNG"))
+    require_format(Path("rates.svg"))
