@@ -11,6 +11,8 @@ from __future__ import annotations
 import ipaddress
 import os
 import re
+import shlex
+import stat
 from pathlib import Path
 
 from backbone.errors import Refusal
@@ -23,6 +25,7 @@ LONGEST_SOCKET_PATH = 107  # linux/un.h: sun_path has 108 bytes, of which the la
 HUB_PORT = 7447  # Zenoh's own
 USER = "scout"  # the one user of today's hubs; certificates will name hosts and people
 SECRET_BYTES = 32  # chosen: 256 bits cannot be guessed
+OF_OTHERS = stat.S_IRWXG | stat.S_IRWXO  # as ssh(1) says of identity files
 LONGEST_SECRET_FILE = 4096  # chosen: a longer file holds no secret
 
 
@@ -164,12 +167,18 @@ def read_secret_file(path: Path) -> str:
     """Return the secret in the file.
 
     Raises:
-        NoSecret: The file holds no secret, or cannot be read.
+        NoSecret: The file holds no secret, cannot be read, or is this account's and open to others, as ssh refuses
+            such a key.
     """
     try:
         with path.open(encoding="ascii") as file:
-            return read_secret(file.read(LONGEST_SECRET_FILE))
+            kept, text = os.fstat(file.fileno()), file.read(LONGEST_SECRET_FILE)
     except (OSError, UnicodeDecodeError) as error:
         raise NoSecret(f"{path}: {error}") from error
+    if stat.S_ISREG(kept.st_mode) and kept.st_uid == os.getuid() and kept.st_mode & OF_OTHERS:
+        told = f"{path}: other accounts of this machine may read it (mode {stat.S_IMODE(kept.st_mode):03o})"
+        raise NoSecret(told, remedy=f"Type: chmod go= {shlex.quote(str(path))}")
+    try:
+        return read_secret(text)
     except NoSecret as none:
         raise NoSecret(f"{path}: {none.detail}") from None

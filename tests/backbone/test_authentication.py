@@ -84,8 +84,21 @@ def test_what_is_no_secret_is_refused(text: str) -> None:
 def test_a_file_that_holds_no_secret_is_refused_by_its_name(tmp_path: Path, content: bytes | None) -> None:
     if content is not None:
         (tmp_path / "secret").write_bytes(content)
-    with pytest.raises(NoSecret, match=str(tmp_path / "secret")):
+        (tmp_path / "secret").chmod(0o600)
+    with pytest.raises(NoSecret, match=str(tmp_path / "secret")) as refused:
         read_secret_file(tmp_path / "secret")
+    assert "mode" not in refused.value.detail
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o620, 0o644])
+def test_a_file_that_other_accounts_may_read_is_refused_as_ssh_does(tmp_path: Path, mode: int) -> None:
+    file = keep_secret(tmp_path, "word")
+    file.chmod(mode)
+    with pytest.raises(NoSecret, match=f"mode {mode:03o}") as refused:
+        read_secret_file(file)
+    assert f"chmod go= {file}" in refused.value.remedy
+    file.chmod(0o400)
+    assert read_secret_file(file) == "word"
 
 
 async def test_a_hub_admits_clients_with_its_secret_at_both_endpoints(

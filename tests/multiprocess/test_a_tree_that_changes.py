@@ -186,6 +186,7 @@ def test_the_guides_commands_print_what_it_says(tmp_path: Path) -> None:
 def test_without_the_missions_secret_nobody_changes_its_tree(operator: Operator, tmp_path: Path) -> None:
     wrong = tmp_path / "secret"
     wrong.write_text("0" * 64)
+    wrong.chmod(0o600)
     words = ["scout-backbone", "tree", "remove", "a-moment", "--mission", operator.mission.name]
     words += ["--connect", operator.mission.endpoint, "--secret-file", str(wrong)]
     done = operator.mission.command(*words)

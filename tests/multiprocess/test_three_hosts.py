@@ -196,6 +196,7 @@ def test_a_host_without_the_secret_stays_outside_and_says_so(short_path: Path) -
     with machines(short_path) as mission:
         mission.type_what_up_prints("near")
         (mission.hosts["far"].folder / "wrong").write_text("scout:c0ffee\n")
+        (mission.hosts["far"].folder / "wrong").chmod(0o600)
         for more in ([], ["--secret-file", "wrong"]):
             connect = f"tcp/{mission.hosts['base'].address}:7447"
             words = ["scout-backbone", "creator", "--host", "far", "--connect", connect, "--mission", NAME, *more]
