@@ -351,7 +351,9 @@ class Explanation:
         if not arc.queued:
             return None, math.inf
         slots = self._schedule.planner_of(arc).slots_around(arc, now_s)
-        own = next(slot for slot in slots if slot.arc is arc)
+        own = next((slot for slot in slots if slot.arc is arc), None)
+        if own is None:
+            raise AssertionError(f"the planner's slots_around({arc.name}) has no slot of {arc.name}, which is queued")
         return own, self._prediction.grants_s(slots, now_s)[arc]
 
     def _until_s(self, arc: ArcEntry) -> float:

@@ -103,3 +103,19 @@ def test_a_planner_whose_starts_are_no_times_is_refused_by_the_dry_run(
     assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
     told = capsys.readouterr().err
     assert "planner_of_no_times:Own: AssertionError: the planner's start of watch-scout1-capture is nan" in told
+
+
+def test_a_planner_that_omits_the_arc_it_is_asked_about_is_named_with_the_arc(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``why`` ended the RC manager with "StopIteration"."""
+    method = (
+        "def due(self, now_s): return None\n    "
+        "def slots_around(self, arc, now_s): "
+        "return [one for one in super().slots_around(arc, now_s) if one.arc is not arc]"
+    )
+    mission = read_mission(file_of(tmp_path, monkeypatch, "planner_that_omits", method))
+    assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
+    told = capsys.readouterr().err
+    assert "planner_that_omits:Own: AssertionError" in told
+    assert "slots_around(watch-scout1-capture) has no slot of watch-scout1-capture" in told
