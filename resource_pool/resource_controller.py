@@ -20,7 +20,7 @@ import msgspec
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.abilities import Abilities, CameraForm, command_form, field_forms
+from backbone.component.abilities import Abilities, CameraForm, field_forms
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.exchange import SwapClass
@@ -41,8 +41,8 @@ from backbone.rc_manager.messages import (
 )
 from backbone.scheduling.requests import Holder
 from backbone.waiting import only_bugs
-from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of
-from resource_pool.commands import OF_THE_BASE, Command
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
+from resource_pool.commands import Command
 from resource_pool.driver_adjusting import adjust_all
 from resource_pool.driver_exchange import DriverExchanges
 from resource_pool.driver_slot import Again, DriverSlot, Judge, always, as_returned
@@ -55,6 +55,7 @@ from resource_pool.drivers.interface import (
 from resource_pool.hold_ends import FAULTS, SAFE_WITHIN_S, HoldEnds, detail_of
 from resource_pool.holds import Hold, HoldTable
 from resource_pool.messages import Applied, ImpossibleUse, NeedsRestart, NotFromYou
+from resource_pool.obeyed_commands import command_forms
 from resource_pool.orders_in_progress import applied_values
 from resource_pool.rc_parameters import RcParameters, sort_out_options
 
@@ -73,6 +74,8 @@ class ResourceController(Component[R], Generic[R]):
     given_elsewhere: ClassVar[frozenset[str]] = frozenset({"driver", "sharable", "capacity", "links", "options"})
     commands: ClassVar[Accepts | None] = None
     """Commands of this kind of RC: classes derived from ``Command``, or other messages for ``command``."""
+    obeyed: ClassVar[tuple[type[Command], ...]] = ()
+    """In a class to derive from that has ``obey``: the commands that this ``obey`` carries out."""
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Field of its commands → smallest and largest value that the hardware obeys, if narrower than the field's."""
     reports: ClassVar[type[msgspec.Struct] | None] = None
@@ -121,11 +124,7 @@ class ResourceController(Component[R], Generic[R]):
         return Abilities(
             is_robot=cls.is_robot,
             body_class=cls.body_class,
-            commands=[
-                command_form(kind, kind.word(), moves=kind.moves, without=OF_THE_BASE, limits=cls.limits)
-                for kind in (kinds_of(cls.commands) if cls.commands is not None else ())
-                if issubclass(kind, Command)
-            ],
+            commands=command_forms(cls, cls.commands, cls.limits),
             reports=field_forms(cls.reports) if cls.reports is not None else [],
             camera=cls.camera,
         )

@@ -76,6 +76,7 @@ class RobotRc(ResourceController[P], Generic[P]):
     parameters_type: ClassVar[type[msgspec.Struct]] = RobotParameters
     driver_kind, driver_field = "robot", "protocol"
     driver_protocol: ClassVar[type] = RobotProtocol
+    obeyed: ClassVar[tuple[type[Command], ...]] = (Halt, SwitchTransmitter)
     is_robot = True
     moves_on_s: ClassVar[float] = 0.0
     """Time for which a part of the robot may move on after the end of a hold, mission seconds."""

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from mission_files import changed, faults_in, read_text
 
+from backbone.mission.class_probe import facts_of
+
 RADIO = '<resource type="command_radio" name="radio" sharable="true" capacity="0.5"'
 GRABBER = '<resource type="framegrabber" name="grabber"'
 SCOUT = '<resource type="scout" name="scout1" features="camera"'
@@ -165,6 +167,7 @@ class Degrees(msgspec.Struct):
 class Table(ResourceController[RcParameters]):
     commands = {commands}
     limits = {limits}
+    async def obey(self, hold, order): return {{}}
 """
 
 
@@ -193,6 +196,35 @@ def test_commands_and_limits_that_cannot_work_are_refused(
         return
     [fault] = faults_in(own, text)
     assert message.replace("own_table", module) in fault.message
+
+
+DEAF = """
+from resource_pool.commands import Command, Halt, Move
+from resource_pool.rcs.robot import RobotParameters, RobotRc
+from resource_pool.resource_controller import RcParameters, ResourceController
+
+class Turn(Command, frozen=True): ...
+
+class Table(ResourceController[RcParameters]):
+    commands = Turn
+
+class Standing(RobotRc[RobotParameters]):
+    commands = Halt
+
+class Cart(RobotRc[RobotParameters]):
+    commands = Halt | Move
+
+class Driven(Cart):
+    async def obey(self, hold, order): return {}
+"""
+
+
+@pytest.mark.parametrize(("name", "lacking"), [("Table", "Turn"), ("Cart", "Move"), ("Standing", ""), ("Driven", "")])
+def test_an_rc_that_carries_out_no_command_is_refused(own: Path, name: str, lacking: str) -> None:
+    """Its first command was refused, while a mission ran."""
+    (own / "own_deaf.py").write_text(DEAF)
+    failure = facts_of(f"own_deaf:{name}").failure
+    assert failure == (f"commands has {lacking}, and no obey carries it out" if lacking else "")
 
 
 def test_a_class_whose_file_is_no_python_is_not_called_missing(own: Path) -> None:
