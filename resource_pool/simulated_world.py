@@ -14,7 +14,8 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
+from backbone.exchange_course import UNPROVED
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
@@ -28,12 +29,12 @@ from resource_pool.drivers.world_messages import (
 from resource_pool.floor_plans import plan_of
 from resource_pool.localization import AskFloorPlan, AskHome, AskPose, Pose
 from scout_model.air import antenna_m, distance_m
-from scout_model.composition import require_body
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.radio_air import RadioAir, Sent
 from scout_model.radio_link import packet_bits
+from scout_model.robot_trial import require_robot
 from scout_model.world import World
 
 AWAY_S = 0.1  # chosen: three frames; together with the usual packet interval well below a robot's time-out
@@ -65,9 +66,11 @@ class SimulatedWorld(Component[WorldParameters]):
         """Return None, unless the named class of a body is refused."""
         if named:
             try:
-                require_body(named)
+                require_robot(named)
             except InvalidWorld as error:
                 raise NoSuchBody(str(error.args[0])) from error
+            except UNPROVED as error:
+                raise NoSuchBody(f"{named} fails with its body: {complaint(error)}") from error
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

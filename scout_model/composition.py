@@ -315,6 +315,7 @@ def require_body(kind: str) -> None:
     if spec.body("robot/body") is None or spec.joint("robot/free") is None:
         raise InvalidWorld(f'the body of {kind} has no <body name="body"> with a <freejoint name="free"/>')
     try:
+        mujoco.MjSpec.from_string(robot_class(kind).body_mjcf()).compile()  # attached, sensors of nothing disappear
         spec.compile()
     except ValueError as error:
         raise InvalidWorld(f"the body of {kind} cannot be built: {' '.join(str(error).split())}") from error

@@ -342,9 +342,9 @@ class World:
         controls = robot.program.controls(now_s)
         if controls != robot.controls:
             for actuator, control in controls.items():
-                number = robot.actuators.get(actuator)
-                if number is None:
-                    raise InvalidWorld(f"{robot.kind} drives {actuator!r}, which its body has not")
+                if (number := robot.actuators.get(actuator)) is None:
+                    there = ", ".join(robot.actuators)
+                    raise InvalidWorld(f"{robot.kind} drives {actuator!r}, but the actuators of its body are: {there}")
                 self._controls[number] = control
             robot.controls.update(controls)
         is_driven = any(controls.values())

@@ -201,7 +201,7 @@ def _check_classes(world: Element, tables: Tables, report: Report) -> None:
         class_path = robot.text("class")
         facts = tables.classes.get(tables.embodied(robot))
         if facts is not None and facts.failure:
-            report.fault(robot.place_of("class"), facts.failure, "Give the class what the message names")
+            report.fault(robot.place_of("class"), facts.failure, "Mend the robot's body or class as the message says")
         if not class_path:
             _check_body(robot, tables, report)
             continue
