@@ -26,6 +26,8 @@ from backbone.naming import is_legal
 from backbone.scheduling.rules import SchedulingRules, rule_fault
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")  # the schema refuses other names
+AGING = "aging_s"
+"""The rc_manager's parameter for aging."""
 SERVICE_PARAMETERS = {"rc_manager": parameters_of(SchedulingRules)}
 """Core service → parameters that the file may set."""
 
@@ -43,10 +45,31 @@ def check_service_parameters(service: Element, tables: Tables, report: Report) -
         one, value = rules.get(parameter.text("name")), parameter_value(parameter.text("value"))
         if one is not None and one.accepts(value) and (fault := rule_fault(one.name, value)):
             report.fault(parameter.place_of("value"), fault, f"{one.name}: {one.meaning}")
+        elif one is not None and one.name == AGING:
+            _check_aging(parameter, tables, report)
         if parameter.text("name") == PLANNER and CLASS_PATH.fullmatch(parameter.text("value")):
             facts = tables.classes.get(tables.planned(service))
             if check_class_path(parameter, "value", report) and facts is not None and facts.failure:
                 report.fault(parameter.place_of("value"), facts.failure, "Mend the planner's class")
+
+
+def _check_aging(parameter: Element, tables: Tables, report: Report) -> None:
+    """Report ARCs that would rise while a resource is handed over, and override each other before a grant."""
+    aging_s = parameter_value(parameter.text("value"))
+    if isinstance(aging_s, bool) or not isinstance(aging_s, int | float) or aging_s <= 0:
+        return
+    handed_over_s = {
+        resource.text("name"): (resource.number("connect-s") or 0.0) + (resource.number("disconnect-s") or 0.0)
+        for resource in section(tables.root, "resources")
+    }
+    slowest = max(handed_over_s, key=handed_over_s.__getitem__, default="")
+    if slowest and aging_s < handed_over_s[slowest]:
+        report.fault(
+            parameter.place_of("value"),
+            f"{AGING} is {aging_s:g}, and {slowest} needs {handed_over_s[slowest]:g} s to disconnect and connect, "
+            "so waiting ARCs would override each other before a grant",
+            f"Write at least {handed_over_s[slowest]:g}, or 0 (never)",
+        )
 
 
 def check_class_parameters(element: Element, reserved: Collection[str], tables: Tables, report: Report) -> None:

@@ -110,3 +110,21 @@ def test_aging_before_a_hand_over_can_end_is_refused(tmp_path: Path) -> None:
     assert "aging_s is 0.001; it must be 0 (never) or at least 1" in str(fault)
     assert fault.line == 12
     assert with_rules(tmp_path, aging_s="1").core_parameters("rc_manager") == {"aging_s": 1}
+
+
+def test_aging_before_the_slowest_resource_is_handed_over_is_refused(tmp_path: Path) -> None:
+    """With 60 s to connect, two ARCs that rise every second never got a turn."""
+    slow = SMALL.read_text().replace('connect-s="0.3"', 'connect-s="2.5" disconnect-s="0.5"')
+    file = tmp_path / "m.xml"
+    aging = '<parameter name="aging_s" value="{}"/>'
+    text = slow.replace(PLAIN, f"{PLAIN[:-2]}>{aging}</service>")
+    file.write_text(text.format(1))
+    with pytest.raises(MissionInvalid) as invalid:
+        read_mission(file)
+    (fault,) = invalid.value.faults
+    assert "aging_s is 1, and video1 needs 3 s to disconnect and connect" in fault.message
+    assert fault.remedy == "Write at least 3, or 0 (never)"
+    assert text.format(1).splitlines()[fault.line - 1][fault.column - 1 :].startswith("value=")
+    for legal in (0, 3):
+        file.write_text(text.format(legal))
+        read_mission(file)
