@@ -152,6 +152,7 @@ function showChosen(element) {
 
 /** @param {Answer} answer */
 function answered(answer) {
+  if ("ask" in answer || ("refused" in answer && answer.is_change)) changes.refuse();
   if ("ask" in answer) adding.add(answer.path, answer.ask, view.status?.revision);
   else if ("refused" in answer) (answer.is_change ? refused : notice)(answer.refused, answer.remedy);
   else if ("notice" in answer) notice(answer.notice, answer.remedy);

@@ -129,7 +129,8 @@ export class Acts {
   atChosen(make) {
     this.change(() => {
       const row = this.tree.row(this.tree.at);
-      return row ? make(this.tree.at, row) : null;
+      const wanted = row ? make(this.tree.at, row) : null;
+      return wanted && { ...wanted, revision: this.view.status?.revision }; // the choice follows its element
     });
   }
 

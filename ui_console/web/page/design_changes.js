@@ -5,8 +5,9 @@ import { fits } from "./link.js";
 /** @import { DraftChange, MakeChange } from "./design_types.d.ts" */
 
 /**
- * Sends a change as soon as the previous one is done; the change is created only then, so that its revision is not too
- *     old.
+ * Sends a change as soon as the previous one is done, and creates it only then. It is meant for the draft that its author
+ * saw, with this page's own changes before it: if another designer changed the draft meanwhile, the server refuses it,
+ * because its path may be that of another element by now.
  *
  * `say` returns whether it was sent, `revision` the draft's, undefined if none is known yet; `refused` is called when a
  * change cannot be sent, `busy` with whether a change waits for the server.
@@ -21,20 +22,31 @@ export class Changes {
     this.revision = revision;
     this.refused = refused;
     this.busy = busy;
-    /** @type {MakeChange[]} */
+    /** @type {{ make: MakeChange, revision: number | undefined }[]} */
     this.waiting = [];
+    this.isRefused = false; // the change underway
     /** @type {DraftChange | null} */
     this.underway = null; // the change that was sent and is neither done nor refused yet
   }
 
   /** @param {MakeChange} make */
   add(make) {
-    this.waiting.push(make);
+    this.waiting.push({ make, revision: this.revision() });
     this.pump();
   }
 
-  /** The server has carried out or refused the last change. */
+  /** The server has refused the last change, or asks for more before it; `handled` follows. */
+  refuse() {
+    this.isRefused = true;
+  }
+
+  /** The server is done with the last change. A change that it carried out is the next revision. */
   handled() {
+    const before = this.underway?.revision,
+      now = this.revision();
+    if (before !== undefined && now !== undefined && now > before && !this.isRefused)
+      for (const one of this.waiting) if (one.revision === before) one.revision = before + 1;
+    this.isRefused = false;
     this.underway = null;
     this.pump();
   }
@@ -55,10 +67,11 @@ export class Changes {
     const revision = this.revision();
     if (revision === undefined) return;
     while (this.underway === null) {
-      const message = this.waiting.shift()?.();
-      if (message === undefined) return;
+      const next = this.waiting.shift();
+      if (next === undefined) return;
+      const message = next.make();
       if (message === null) continue;
-      this.underway = { ...message, revision: message.revision ?? revision };
+      this.underway = { ...message, revision: message.revision ?? next.revision ?? revision };
       if (!fits(this.underway)) {
         this.refused("This is too long for the page", "Write it into the file.");
         this.underway = null;

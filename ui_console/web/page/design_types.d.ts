@@ -10,7 +10,7 @@ export type DraftChange = Extract<Said, { revision: number }>;
 
 type Wanted<One> = One extends DraftChange ? Omit<One, "revision"> & { revision?: number } : never;
 
-/** A change that waits; without a revision it is meant for the draft as it is when its turn comes. */
+/** A change that waits; without a revision it is meant for the draft that its author saw, see `Changes`. */
 export type WantedChange = Wanted<DraftChange>;
 
 /** Makes a change when its turn comes; null: nothing is to be done any more. */

@@ -75,3 +75,36 @@ test("a change that was meant for an older draft says so when its turn comes", (
   assert.deepEqual(on.said[0], { revision: 1, do: "move", path: [2], parent: [0], before: null });
   assert.deepEqual(on.said[1], { revision: 2, do: "remove", path: [2] });
 });
+
+test("a change that waits while another designer changes the draft is not sent for the new draft", () => {
+  const on = stage();
+  on.changes.add(() => ({ do: "undo" }));
+  on.changes.add(() => ({ do: "set", path: [2], name: "x-m", value: "1", is_parameter: false }));
+  on.revision = 3; // the own change, and at once another designer's
+  on.changes.handled();
+  assert.equal(on.said[1].revision, 2);
+});
+
+test("a change that waits behind a refused one stays meant for the draft that its author saw", () => {
+  const on = stage();
+  on.changes.add(() => ({ do: "undo" }));
+  on.changes.add(() => ({ do: "set", path: [2], name: "x-m", value: "1", is_parameter: false }));
+  on.revision = 2; // another designer's
+  on.changes.refuse();
+  on.changes.handled();
+  assert.equal(on.said[1].revision, 1);
+});
+
+test("changes in a row are meant for what the ones before them made", () => {
+  const on = stage();
+  for (let number = 0; number < 4; number += 1)
+    on.changes.add(() => ({ do: "take", path: [], label: "x", answers: [] }));
+  for (const revision of [2, 3, 3, 4]) {
+    on.revision = revision; // the third one has no effect
+    on.changes.handled();
+  }
+  assert.deepEqual(
+    on.said.map((one) => one.revision),
+    [1, 2, 3, 3],
+  );
+});
