@@ -40,7 +40,7 @@ class Wish:
 
     Attributes:
         missing_since_s: Mission time at which it was found missing; negative: it is placed, or is being started.
-        cause: Why it is missing.
+        cause: Why it is missing, in one line.
         started: True if it was ever placed.
     """
 
@@ -59,8 +59,13 @@ class Wish:
         self.missing_since_s, self.cause = -1.0, ""
 
     def missing(self, cause: str, now_s: float) -> None:
-        """Record that the placer does not have the component."""
-        self.cause = cause
+        """Record that the placer does not have the component.
+
+        Args:
+            cause: Its first line names the fault; further lines, the end of a log, are dropped.
+            now_s: Mission time.
+        """
+        self.cause = cause.partition("\n")[0]
         if self.missing_since_s < 0:
             self.missing_since_s = now_s
 

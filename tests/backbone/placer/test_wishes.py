@@ -116,3 +116,13 @@ def test_what_is_ready_is_not_missed_though_the_answer_to_its_start_is_lost() ->
         assert wish.absence() is None
 
     run_kept(trial)
+
+
+def test_an_absence_names_the_fault_in_one_line_without_the_end_of_the_log() -> None:
+    """Health showed a traceback with its line ends as characters."""
+    wish = Wish("watcher")
+    told = 'watcher: exit code 1: KeyError: 3 (own.py, line 4)\nTraceback (most recent call last):\n  File "own.py"'
+    wish.not_started(f"it was refused: {told}", 1.0)
+    absence = wish.absence()
+    assert absence is not None
+    assert absence.cause == "it was refused: watcher: exit code 1: KeyError: 3 (own.py, line 4)"
