@@ -119,7 +119,7 @@ class Component(Generic[P_co]):
         """``<subsystem>/<name>``."""
         self.pid = os.getpid()
         """Pid of its process. A simulation, where many components share one process, sets other numbers."""
-        self.parameters: P_co = cast(P_co, parameters_from(launch.parameters, self.parameters_type))
+        self.parameters: P_co = cast(P_co, parameters_from(launch.parameters, self.parameters_type, launch.name))
         self.story = StoryBook(self.address, clock)
         self.feedback = ""
         self._state, self._since_s = LifeState.CONNECTING, clock.now_s()

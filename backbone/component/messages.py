@@ -254,7 +254,7 @@ class WrongParameter(Refusal):
     """A parameter of that name does not exist, or the value does not fit it."""
 
     code = "component.parameter"
-    remedy = "See 'scout-backbone set NAME' for the component's parameters and values; a new value is of the same type."
+    remedy = "Use a parameter of its class with a value of its type; 'scout-backbone set NAME' lists those of NAME."
 
 
 CommonQuestion = AskState | AskTime | AskStatistics | AskParameters | SetParameter | AskStory | Stop

@@ -131,7 +131,7 @@ def test_a_parameter_that_does_not_fit_is_refused_with_the_reason(name: str, val
         with pytest.raises(WrongParameter) as refused:
             await stage.ask(SetParameter(name, value), Parameters)
         assert complaint in refused.value.detail
-        assert "See 'scout-backbone set NAME'" in refused.value.remedy
+        assert "'scout-backbone set NAME' lists" in refused.value.remedy
         assert stage.walker.parameters == Gait()
         stage.walker.end("enough")
         await life
@@ -157,7 +157,7 @@ def test_a_parameter_the_component_refuses_is_not_kept() -> None:
 def test_launch_parameters_that_do_not_fit_are_refused_before_it_lives(parameters: dict[str, Any]) -> None:
     async def law() -> None:
         network, clock = LocalNetwork(), VirtualClock()
-        with pytest.raises(WrongParameter):
+        with pytest.raises(WrongParameter, match=f"{WALKER.partition('/')[2]}: "):
             Walker(launch(parameters=parameters), network.join(WALKER, clock), clock)
 
     live(law())
