@@ -36,7 +36,10 @@ async def drive_by_script(where: Where, wished: dict[str, object], user: str, sc
     try:
         if script != STANDARD_INPUT:
             steps = read_script(await asyncio.to_thread(Path(script).read_text))
-    except (OSError, UnicodeDecodeError, WrongScript) as error:
+    except OSError as error:
+        say(f"{script} cannot be read: {error.strerror or error}")
+        return ExitCode.USAGE
+    except (UnicodeDecodeError, WrongScript) as error:
         say(f"{script}: {error}")
         return ExitCode.USAGE
     joining = await join(where, wished)
