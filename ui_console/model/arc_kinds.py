@@ -31,8 +31,8 @@ def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources
     Raises:
         NoArcKind: The mission has no kind for the robot.
     """
+    robots = sorted(resource.name for resource in resources if resource.is_robot)
     if robot and not any(resource.name == robot for resource in resources):
-        robots = sorted(resource.name for resource in resources if resource.is_robot)
         others = ", ".join(robots) or "none"
         raise NoArcKind(
             f"no robot is named {robot!r}{did_you_mean(robot, robots)}; there is {others}", remedy=NAME_ONE, robot=robot
@@ -42,6 +42,9 @@ def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources
     complete = _complete(drives, resources) or drives
     if not complete:
         kinds = ", ".join(sorted(of_robot))
+        if robot and robots and robot not in robots:
+            told = f"{robot} is a {kinds}, which no kind of ARC has as its body; the robots are {', '.join(robots)}"
+            raise NoArcKind(told, remedy="Name a robot, or a device that an ARC kind has as its body.", robot=robot)
         raise NoArcKind(f"no kind of ARC has a body of kind {kinds}" if kinds else "there is no robot", robot=robot)
     return min(complete, key=lambda one: _badness(one, sight)).name
 

@@ -68,7 +68,7 @@ def test_a_device_is_claimed_by_its_name_and_never_as_any_robot() -> None:
 @pytest.mark.parametrize(
     ("robot", "told"),
     [
-        ("radio1", "body of kind radio"),
+        ("radio1", "radio1 is a radio, which no kind of ARC has as its body; the robots are rover1, scout1"),
         ("scuot1", r"no robot is named 'scuot1' \(did you mean 'scout1'\?\); there is rover1, scout1"),
     ],
 )
