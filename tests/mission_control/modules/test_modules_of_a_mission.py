@@ -230,7 +230,8 @@ def test_a_module_that_cannot_be_imported_or_made_is_a_fault_at_its_class(
     (tmp_path / "broken_module.py").write_text("raise RuntimeError('being written')\nclass Broken: ...\n")
     (tmp_path / "dying_module.py").write_text("import os\nos._exit(3)\nclass Dying: ...\n")
     [broken] = faults(tmp_path, mission(unit("one", module("broken", "broken_module:Broken"))))
-    assert broken == "5:23 broken_module:Broken: RuntimeError: being written"
+    place = f"({tmp_path / 'broken_module.py'}, line 1)"
+    assert broken == f"5:23 broken_module:Broken: RuntimeError: being written {place}"
     (tmp_path / "written_module.py").write_text(HALF_WRITTEN)
     for name, told in (
         ("NoPorts", "5:20 written_module:NoPorts.Outputs declares no ports"),
