@@ -360,8 +360,7 @@ def test_a_camera_that_is_opened_again_delivers_as_before(local_mission: Any) ->
     async def scene(pool: Pool) -> None:
         assert Bench.tuned == {"FirstCamera": "video"}
         Bench.fault = "open"
-        swapped = await swap(pool, "SecondCamera", at="resource_pool/camera")
-        assert "no such device" in swapped.cause
+        assert "no such device" in (await swap(pool, "SecondCamera", at="resource_pool/camera")).cause
         assert Bench.tuned == {"FirstCamera": "video"}
 
     a_camera(local_mission, scene)

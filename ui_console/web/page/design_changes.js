@@ -5,9 +5,9 @@ import { fits } from "./link.js";
 /** @import { DraftChange, MakeChange } from "./design_types.d.ts" */
 
 /**
- * Sends a change as soon as the previous one is done, and creates it only then. It is meant for the draft that its author
- * saw, with this page's own changes before it: if another designer changed the draft meanwhile, the server refuses it,
- * because its path may be that of another element by now.
+ * Sends a change as soon as the previous one is done, and creates it only then. It is meant for the draft that its
+ * author saw, with this page's own changes before it: if another designer changed the draft meanwhile, the server
+ * refuses it, because its path may be that of another element by now.
  *
  * `say` returns whether it was sent, `revision` the draft's, undefined if none is known yet; `refused` is called when a
  * change cannot be sent, `busy` with whether a change waits for the server.
