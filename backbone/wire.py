@@ -41,9 +41,7 @@ from backbone.ranges import (
 
 WIRE_VERSION = 1
 MAX_MESSAGE_BYTES = 8 * 1024 * 1024  # chosen: a 1080p colour frame (6.2 MB) fits, a runaway list does not
-MAX_LARGE_MESSAGE_BYTES = (
-    64 * 1024 * 1024
-)  # chosen: a 4K picture in color is 25 MB; of ``LARGE`` conversations on a host
+MAX_LARGE_MESSAGE_BYTES = 64 << 20  # chosen: a 4K picture in color is 25 MB; of ``LARGE`` conversations on a host
 LONGEST_QUOTED = 100  # chosen: a name and the first words of a sentence, in a refusal
 
 

@@ -14,9 +14,7 @@ from backbone.naming import legal
 
 HEADER = struct.Struct("<QQ")
 """Number and length of a value."""
-MOST_IN_PACKET = (
-    131_072  # measured: up to here each reader's copy costs less than a memory file; a socket takes 212 992
-)
+MOST_IN_PACKET = 131_072  # measured: a memory file costs less above; a socket takes 212 992
 MOST_PACKET_BYTES = HEADER.size + MOST_IN_PACKET
 MOST_VALUE_BYTES = 64 * 1024 * 1024  # chosen: a 4K picture in color is 25 MB; a runaway list does not fit
 

@@ -17,9 +17,7 @@ from backbone.wire import Envelope, Message, refuse_oversized, write
 
 log = logging.getLogger(__name__)
 
-MISSED_AFTER_S = (
-    2.0  # chosen: a listener of this host finds the board within milliseconds, on a busy machine in a second
-)
+MISSED_AFTER_S = 2.0  # chosen: a listener of this host finds the board in milliseconds, on a busy machine in 1 s
 MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
 KNOWN_AFTER_S = 1.0  # chosen: a new publisher knows its subscribers by then; it takes milliseconds
 

@@ -36,9 +36,7 @@ from backbone.quality import QUALITY
 from backbone.waiting import settle
 
 MOST_WAYS = 64  # chosen: each way is a declaration at the hub; components beyond them are asked by queries
-STILL_COME_S = (
-    0.1  # measured: one in a hundred reports of an owner's end overtakes the owner's last answer, by milliseconds
-)
+STILL_COME_S = 0.1  # measured: one report of an owner's end in a hundred overtakes its last answer by milliseconds
 _NUMBER = struct.Struct("<Q")
 _ANSWERED, _UNANSWERED = b"\1", b"\0"
 _ON_HOST = "\n"  # between the name of an inbox and that of its process's socket

@@ -27,9 +27,7 @@ from backbone.wire import Message
 
 TYPE = "creator"
 READY_WITHIN_S = 10.0  # chosen: of silence; a starting process beats while it imports, renders or waits for others
-CUT_OFF_ENDS_WITHIN_S = (
-    7.0  # chosen: 2 s until a link counts as cut, 3 s until a cut-off host ends all, 2 s until all have ended
-)
+CUT_OFF_ENDS_WITHIN_S = 7.0  # chosen: 2 s until a link counts as cut, 3 s until its host ends all, 2 s to end
 START_MOST_S = 180.0  # chosen: a start that is not ready by then has failed, even if it shows signs of life
 
 

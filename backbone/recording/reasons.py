@@ -22,9 +22,7 @@ from backbone.scheduling.requests import UnknownRequest
 from backbone.scheduling.views import Why
 from backbone.spoken import counted
 
-TOGETHER_S = (
-    0.5  # chosen: when the hub goes, all tokens fall within 10 ms (measured), and so they rise; mission seconds
-)
+TOGETHER_S = 0.5  # chosen: when the hub goes, all tokens fall and rise within 10 ms (measured); mission seconds
 _SAID = tuple(f"*/{said}" for said in (Conversation.STATUS, Conversation.HEALTH, Conversation.ASK, Conversation.ALIVE))
 
 

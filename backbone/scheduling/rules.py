@@ -16,9 +16,7 @@ from backbone.scheduling.response_time import Analysis
 Policy = Literal["no_delay", "strict"]
 
 ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
-SHORTEST_AGING_S = (
-    1.0  # chosen: longer than common RCs settle; check compares with the settling times of the mission's own RCs
-)
+SHORTEST_AGING_S = 1.0  # chosen: longer than common RCs settle; check compares with those of the mission
 LONGEST_S = 86_400.0  # chosen: a day, as for all other times of a mission file
 
 

@@ -18,10 +18,7 @@ MARKERS = ("o", "^", "D", "v", "P", "X", "*")
 """Distinguishes series even without color."""
 GREY = "#555555"
 SIDE_BY_SIDE = 0.035  # chosen: intervals of one load are beside each other, but clearly belong together
-FORMATS = (
-    ".png",
-    ".svg",
-)  # chosen: others of the library fail after all trials, as .pgf without LaTeX
+FORMATS = (".png", ".svg")  # chosen: others of the library fail after all trials, as .pgf without LaTeX
 LEAST_GAP = 4.5  # chosen: a line of text in percent of the picture's height
 
 
