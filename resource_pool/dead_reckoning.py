@@ -169,6 +169,9 @@ class DeadReckoning:
         """Replace the belief by the pose that a landmark showed at ``at_s``, plus the motion since then.
 
         A sighting older than ``REMEMBERED_S`` is ignored.
+
+        Args:
+            at_s: Mission time of the picture, at most the present.
         """
         now = self._belief
         fits = pose.is_finite and _are_sane(FARTHEST_M, spread_m, spread_rad) and min(spread_m, spread_rad) >= 0

@@ -47,7 +47,7 @@ wild = st.floats(allow_nan=True, allow_infinity=True)
 hostile = st.one_of(
     st.tuples(wild, wild).map(lambda given: moving(*given)),
     st.tuples(wild, wild).map(lambda given: counting(*given)),
-    st.tuples(st.builds(FloorPose, wild, wild, wild), wild, wild, wild).map(lambda given: sighting(*given)),
+    st.tuples(st.builds(FloorPose, wild, wild, wild), wild, wild, wild.map(abs)).map(lambda given: sighting(*given)),
     jumps,
     honest_moves,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 
 import pytest
+from small_recordings import CLASSES, MISSION, SCOUT
 
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
@@ -13,7 +14,6 @@ from backbone.recording.reader import Recording
 from backbone.recording.recovering import recover
 from backbone.recording.writer import RecordingWriter
 from backbone.wire import WIRE_VERSION, Envelope, write
-from tests.small_recordings import CLASSES, MISSION, SCOUT
 
 XML = "<mission/>"
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 
+from small_recordings import CLASSES, MISSION, SCOUT
+
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
 from backbone.keys import key as key_of
@@ -11,7 +13,6 @@ from backbone.recording.reader import Recording
 from backbone.recording.recovering import recover
 from backbone.recording.writer import RecordingWriter
 from backbone.wire import WIRE_VERSION, Envelope, write
-from tests.small_recordings import CLASSES, MISSION, SCOUT
 
 KEY = key_of(MISSION, SCOUT, Conversation.LOG)
 
