@@ -234,7 +234,10 @@ async def _play_to_end(player: Player) -> None:
 
 async def _asked_for_step(message: Recorded) -> None:
     """Print the next message, and return when a line was read."""
-    show([message_line(message)])
+    try:
+        show([message_line(message)])
+    except KeyboardInterrupt:
+        signal.raise_signal(signal.SIGINT)  # to the replay, which it ends in good order as it does between two lines
     if not await in_thread_within(_read_line, None):
         await asyncio.Event().wait()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import signal
 import subprocess
@@ -112,6 +113,22 @@ def test_it_ends_while_its_output_is_not_read(monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(KeyboardInterrupt):
         event_loop.exit_code_of(command)
     assert output.getvalue() == ""
+
+
+def test_a_step_of_a_replay_passes_its_ctrl_c_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdout", _Interrupting())
+    monkeypatch.setattr(replaying, "message_line", lambda _message: "a line")
+    monkeypatch.setattr(replaying, "_read_line", lambda: False)
+
+    async def main() -> None:
+        ended, loop = asyncio.Event(), asyncio.get_running_loop()
+        loop.add_signal_handler(signal.SIGINT, ended.set)
+        asked: Any = replaying._asked_for_step  # noqa: SLF001  the player calls it before each message
+        step = asyncio.create_task(asked(None))
+        await asyncio.wait_for(ended.wait(), 10)
+        step.cancel()
+
+    asyncio.run(main())
 
 
 @pytest.mark.processes
