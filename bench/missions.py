@@ -1,4 +1,4 @@
-"""A real mission for a program in bench/: up while a block runs, and ended whatever happens in the block."""
+"""A real mission for a program in bench/: it is up while a block runs, and ends with the block, after an error too."""
 
 from __future__ import annotations
 

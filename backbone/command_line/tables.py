@@ -40,7 +40,7 @@ class MissionTables:
 
 
 def print_on(console: Console, shown: RenderableType) -> None:
-    """Print it; Ctrl-C ends it also while nobody reads."""
+    """Print a table or a text; Ctrl-C ends the printing even if no reader takes it."""
     with interruptible([signal.SIGINT]):
         console.print(shown)
 

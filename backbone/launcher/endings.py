@@ -36,7 +36,7 @@ def say(line: str) -> None:
 
 
 def show(lines: Iterable[str]) -> None:
-    """Print data on stdout as printable text; Ctrl-C ends it also while nobody reads. In the main thread."""
+    """Print data on stdout as printable text; Ctrl-C ends the printing even if no reader takes it. Main thread only."""
     for line in lines:
         with interruptible([signal.SIGINT]):
             print(printable_lines(line, most=sys.maxsize), flush=True)

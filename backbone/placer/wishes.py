@@ -55,7 +55,7 @@ class Wish:
         self.missing_since_s, self.cause, self.started, self._pause_s = -1.0, "", True, PAUSE_FIRST_S
 
     def ready(self) -> None:
-        """Record that the component itself says that it is ready, whatever the placer and the hub know."""
+        """Record that the component answered that it is ready; placer and hub may not know it yet."""
         self.missing_since_s, self.cause = -1.0, ""
 
     def missing(self, cause: str, now_s: float) -> None:

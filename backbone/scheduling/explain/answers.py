@@ -61,7 +61,8 @@ class Answers:
             WrongPlanner: The mission's own planner cannot be copied.
         """
         self._manager = manager
-        self._copied()
+        if manager.rules.planner:  # the RC manager's own planners can be copied, and a copy of a large schedule is slow
+            self._copied()
         self._state = manager.master_schedule.state
         self._explanation = Explanation(manager.master_schedule, manager.rules, self._foresee)
 
