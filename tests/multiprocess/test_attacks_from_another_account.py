@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,22 @@ def ports_of(processes: list[psutil.Process]) -> list[int]:
     return sorted(found)
 
 
+def lines_of(processes: list[psutil.Process]) -> list[str]:
+    """Return the names at which these processes take questions of their host; other missions have such names too."""
+    names = set()
+    for process in processes:
+        of_process = Path(f"/proc/{process.pid}")
+        own = set()
+        for descriptor in (of_process / "fd").iterdir():
+            with suppress(FileNotFoundError):  # closed meanwhile
+                own.add(os.readlink(descriptor))
+        for row in (of_process / "net" / "unix").read_text().splitlines():  # of the process's network namespace
+            *_, inode, name = row.split()
+            if f"socket:[{inode}]" in own and name.startswith("@scout-backbone/"):
+                names.add(name)
+    return sorted(names)
+
+
 def let_others_enter(folder: Path) -> None:
     """Open all folders around the missions' own, which alone then keeps others out."""
     for parent in (folder, *folder.parents):
@@ -98,6 +115,7 @@ def what_is_known(mission: RunningMission, uid: int, victim: Path) -> dict[str, 
         "folder": str(mission.directory),
         "victim": str(victim),
         "pids": [process.pid for process in processes],
+        "lines": lines_of(processes),
     }
 
 
@@ -157,7 +175,7 @@ def test_no_attack_without_the_secret_changes_a_mission_on_three_machines(victim
             "attempts": ATTEMPTS // 2,
         }
         for host in (base, mission.hosts["far"]):
-            found = attacks(given, ("ip", "netns", "exec", host.namespace))
+            found = attacks(given | {"lines": lines_of(host.processes())}, ("ip", "netns", "exec", host.namespace))
             assert sum(found["tried"].values()) == ATTEMPTS // 2
             assert found["reached"] == {}, found
         after = {name: c["pid"] for name, c in mission.components().items() if name in mission.names}
