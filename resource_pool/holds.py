@@ -101,15 +101,17 @@ class HoldTable:
             return None
         return self._holds.pop(arc)
 
-    def admit(self, arc: str, epoch: int) -> Hold:
+    def admit(self, arc: str, epoch: int, now_s: float) -> Hold:
         """Return the hold that admits this command.
 
         Raises:
-            StaleEpoch: The ARC does not hold the RC under this epoch.
+            StaleEpoch: The ARC does not hold the RC under this epoch, or no longer: its lease is over.
         """
         hold = self._holds.get(arc)
-        if hold is None or hold.epoch != epoch:
-            present = f"epoch {hold.epoch}" if hold else "no connection"
+        if hold is None or hold.epoch != epoch or hold.lease_until_s <= now_s:
+            present = "no connection" if hold is None else f"epoch {hold.epoch}"
+            if hold is not None and hold.epoch == epoch:
+                present = "it, but its lease is over"
             raise StaleEpoch(
                 f"{self._rc}: {arc} commands under epoch {epoch}, it has {present}",
                 epoch=epoch,

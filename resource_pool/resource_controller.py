@@ -223,7 +223,7 @@ class ResourceController(Component[R], Generic[R]):
             StaleEpoch: The command is not of a present hold; it is counted as refused.
         """
         try:
-            hold = self.holds.admit(arc, epoch)
+            hold = self.holds.admit(arc, epoch, self.clock.now_s())
         except StaleEpoch:
             self.refused_stale += 1
             self.story.note(arc, f"a command of its epoch {epoch} was refused")

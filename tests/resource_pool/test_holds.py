@@ -38,7 +38,7 @@ def take(table: HoldTable, step: tuple[str, str, int, float]) -> Any:
             return table.renew(arc, epoch, time_s)
         case "expire":
             return table.expire(time_s)
-    return table.admit(arc, epoch)
+    return table.admit(arc, epoch, time_s)
 
 
 @given(st.booleans(), st.lists(STEPS, max_size=40))
@@ -54,7 +54,10 @@ def test_epochs_only_grow_a_unit_rc_has_one_holder_and_a_refusal_changes_nothing
             outcome = take(table, step)
         except (StaleEpoch, Held):
             assert (table.holds(), table.last_epoch) == (before, last)
-            assert not (what == "admit" and table.has(arc, epoch))
+            assert not (
+                what == "admit"
+                and any(one.epoch == epoch and one.lease_until_s > time_s for one in before if one.arc == arc)
+            )
             continue
         assert table.last_epoch >= last
         assert sharable or len(table.holds()) <= 1
@@ -71,6 +74,7 @@ def test_epochs_only_grow_a_unit_rc_has_one_holder_and_a_refusal_changes_nothing
             case "admit":
                 assert (outcome.arc, outcome.epoch) == (arc, epoch)
                 assert outcome in before
+                assert outcome.lease_until_s > time_s
         expiry_s = table.next_expiry_s()
         assert expiry_s == min((left.lease_until_s for left in table.holds()), default=None)
     assert connected == sorted(set(connected))
@@ -96,7 +100,7 @@ def test_a_command_of_the_hold_before_is_stale_and_says_so_in_numbers() -> None:
     table.disconnect("one", 1)
     table.connect(hold("one", 2))
     with pytest.raises(StaleEpoch) as refused:
-        table.admit("one", 1)
+        table.admit("one", 1, 0.5)
     assert refused.value.facts == {"epoch": 1, "last_epoch": 2}
 
 

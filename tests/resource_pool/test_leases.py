@@ -8,12 +8,14 @@ from typing import Any
 
 import pytest
 from pool_on_local_network import a_pool
-from pool_orders import ROBOTS, connect, drive_always, state_of
+from pool_orders import ROBOTS, at, command, connect, connect_robot, disconnect, drive_always, state_of
 
 from backbone.bus.clock import run_virtual
 from backbone.errors import Refusal
-from resource_pool.messages import SwappedOut
-from scout_model.radio_link import encode_safe
+from backbone.rc_manager.messages import StaleEpoch
+from resource_pool.commands import Drive
+from resource_pool.messages import LoadPacket, PacketLoaded, SwappedOut
+from scout_model.radio_link import encode_drive, encode_safe
 
 
 def test_when_the_rc_manager_dies_for_good_every_rc_makes_itself_safe(local_mission: Any) -> None:
@@ -78,5 +80,24 @@ def test_a_granted_arc_goes_on_through_a_restart_of_the_rc_manager(local_mission
             assert applied.epoch == before.epochs["scout1"]
             assert owner.heard() == ["Resumed"]
             assert encode_safe() not in {heard.payload for heard in pool.radio_driver.heard}
+
+    run_virtual(main())
+
+
+def test_no_command_is_obeyed_after_its_lease_while_the_rc_is_busy_with_another_hold(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ROBOTS, manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            await connect_robot(pool, "two", 2, scout="scout2")
+            await command(pool, "two", 2, Drive(1.0, 1.0), scout="scout2")
+            await pool.clock.sleep_s(1.9)
+            pool.radio_driver.hangs = True
+            ending = asyncio.create_task(disconnect(pool, "radio", "two", 2))  # for 0.4 s
+            await pool.clock.sleep_s(0.2)
+            packet = LoadPacket("one", 1, 1, encode_drive(3.0, 3.0), encode_safe(), 1, moves=True)
+            with pytest.raises(StaleEpoch, match="its lease is over"):
+                await pool.voice("scout1").ask(at("radio"), packet, PacketLoaded, within_s=1)
+            pool.radio_driver.hangs = False
+            await asyncio.gather(ending, return_exceptions=True)
 
     run_virtual(main())
