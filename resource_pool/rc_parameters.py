@@ -1,4 +1,4 @@
-"""Parameters of every RC, and the options of its driver among them."""
+"""Parameters of every RC and of every robot, and the options of its driver among them."""
 
 from __future__ import annotations
 
@@ -31,6 +31,20 @@ class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     links: dict[str, list[str]] = {}
     world: str = "world"
     options: dict[str, Any] = {}
+
+
+class RobotParameters(RcParameters, frozen=True, kw_only=True):
+    """Parameters of a robot.
+
+    Attributes:
+        network_id: Its address on the command radio, 1 to 254.
+        protocol: Name of the driver that encodes its packets; empty: the name in ``driver``.
+        battery_alarm_share: Battery charge below which an alarm is raised, 0 to 0.9; 0: no alarm.
+    """
+
+    network_id: int
+    protocol: str = ""
+    battery_alarm_share: Annotated[float, msgspec.Meta(ge=0, le=0.9)] = 0.2
 
 
 def sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:

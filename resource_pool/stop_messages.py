@@ -60,7 +60,7 @@ class StopState(Message, frozen=True):
         at_s: Mission time of the stop, or of its end.
         is_confirmed: False if the radio did not accept the packet that stops the robot, or if no ARC holds the robot
             and a part of it may still move. Then no new packet moves the robot, and its present motion ends by itself,
-            that of the wheels within ``COMMAND_TIMEOUT_S``.
+            that of the wheels within twice ``COMMAND_TIMEOUT_S`` after the last command.
         console: Address of the console of the operator ``by``.
         also: Other operators who stopped it since it last moved.
     """

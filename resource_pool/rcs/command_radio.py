@@ -150,6 +150,7 @@ class CommandRadio(ResourceController[RcParameters]):
         else:
             self._schedule.load(packet, now_s)
             self._loaded.set()
+            await self._wait_overtaken(packet.network_id)
         return PacketLoaded()
 
     def ranked(self, arc: str, epoch: int) -> None:
@@ -215,6 +216,13 @@ class CommandRadio(ResourceController[RcParameters]):
             raise
         finally:
             del self._waiting[ticket]
+
+    async def _wait_overtaken(self, network_id: int) -> None:
+        """Wait until a packet that the robot's last stop overtook in the driver is done, so that none follows."""
+        last = self._in_the_air
+        if last is not None and last.network_id == network_id and self._schedule.is_overtaken(last):
+            async with self._air:
+                await self.clock.sleep_until_s(self._air_free_s)
 
     def _overtaken(self, packet: Packet) -> GivenBeforeStop:
         return GivenBeforeStop(f"{self.name}: robot {packet.network_id} was stopped after this packet was made")

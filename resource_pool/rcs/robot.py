@@ -12,7 +12,7 @@ import asyncio
 import functools
 import logging
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Generic, TypeVar, cast
+from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
@@ -24,14 +24,17 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
 from resource_pool.commands import Command, Halt, SwitchTransmitter
-from resource_pool.drivers.interface import HardwareFault, ReplyReader, RobotProtocol
+from resource_pool.drivers.interface import ReplyReader, RobotProtocol, of_bytes
 from resource_pool.holds import Hold
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, AskReadings, LoadPacket, NotFromYou, PacketLoaded
-from resource_pool.resource_controller import RcParameters, ResourceController
+from resource_pool.rc_parameters import RobotParameters
+from resource_pool.resource_controller import ResourceController
 from resource_pool.robot_reports import RobotReports
 from resource_pool.stop_file import StopFile
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop, EmergencyQuestion, EmergencyStop, GivenBeforeStop, LiftStop, StopState
+
+__all__ = ["RobotParameters", "RobotRc"]
 
 log = logging.getLogger(__name__)
 
@@ -39,20 +42,7 @@ OPERATORS = (f"{Subsystem.UI_CONSOLE}/", f"{Subsystem.BACKBONE}/")
 """Subsystems whose components may stop any robot without a grant, because they act for people."""
 
 RADIO_REPLY_S = 0.5  # chosen: a radio that needs longer for one packet counts as absent
-
-
-class RobotParameters(RcParameters, frozen=True, kw_only=True):
-    """Parameters of a robot.
-
-    Attributes:
-        network_id: Its address on the command radio, 1 to 254.
-        protocol: Name of the driver that encodes its packets; empty: the name in ``driver``.
-        battery_alarm_share: Battery charge below which an alarm is raised, 0 to 0.9; 0: no alarm.
-    """
-
-    network_id: int
-    protocol: str = ""
-    battery_alarm_share: Annotated[float, msgspec.Meta(ge=0, le=0.9)] = 0.2
+GOES_ON_S = 2 * COMMAND_TIMEOUT_S  # the radio repeats a packet for so long at most, and the robot obeys the last one
 
 
 class NoRadio(Refusal):
@@ -88,12 +78,14 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._protocol: RobotProtocol = self.make_driver(self.parameters.protocol, judge=self._of_bytes)
+        self._protocol: RobotProtocol = self.make_driver(
+            self.parameters.protocol, judge=functools.partial(of_bytes, self.driver_protocol)
+        )
         self._radio = (self.parameters.links.get("command_radio") or [""])[0]
         self._halt_at_s: float | None = None
         self._driven = asyncio.Event()
         self._holder: Hold | None = None
-        self._at_rest_s = self._born_s + self.moves_on_s
+        self._at_rest_s = self._born_s + max(self.moves_on_s, GOES_ON_S)  # its former process may have moved it
         self._frequency = ""
         self._timeouts = 0
         self._stop_file = StopFile(launch.run_directory, self.name)
@@ -123,6 +115,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Stop the wheels when no command comes, and end the hold when its lease expires."""
         if self._latch.state.is_stopped:
             self._tell_stop(self._latch.state, "is still stopped")
+            self._confirm_at_rest()
         self.start_task(self._halt_when_silent(), "dead man")
         self.start_task(self._reports.publish_when_due(), "readings")
         await super().serve()
@@ -134,7 +127,7 @@ class RobotRc(ResourceController[P], Generic[P]):
     async def make_safe(self, hold: Hold) -> None:
         """Send no further command; the radio sends the safe packet when the radio is disconnected."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
-        self._at_rest_s = self.clock.now_s() + self.moves_on_s
+        self._at_rest_s = max(self._at_rest_s, self.clock.now_s() + self.moves_on_s)
         self.cease()
         self._tell_halted(hold)
 
@@ -271,12 +264,26 @@ class RobotRc(ResourceController[P], Generic[P]):
                 self._latch.confirm(True)
                 self._tell_halted(holder)
         else:
-            # A former holder's last packet was a safe one, or its radio sends no more.
+            # A former holder's last packet was a safe one, or the radio was late, or sends no more.
             self._latch.confirm(self.clock.now_s() >= self._at_rest_s)
+            self._confirm_at_rest()
         self._publish_stop()
         if is_new:
             self.publish_event(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
         return self._latch.state
+
+    def _confirm_at_rest(self) -> None:
+        """Confirm a stop without a holder as soon as no former packet can move the robot."""
+        stop = self._latch.state
+
+        async def confirm() -> None:
+            await self.clock.sleep_until_s(self._at_rest_s)
+            if self._latch.state == stop:
+                self._latch.confirm(True)
+                self._publish_stop()
+
+        if not stop.is_confirmed:
+            self.start_task(confirm(), "at rest")
 
     async def _end_stop_packet(self) -> None:
         """Repeat a halt from now on: repeated stop packets would stop a part that moves beside the wheels again."""
@@ -323,6 +330,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     async def _move(self, hold: Hold, order: Command, packet: bytes, **how: Any) -> None:
         self.permit(order)  # again, because ``obey`` may have waited since
+        self._at_rest_s = max(self._at_rest_s, self.clock.now_s() + GOES_ON_S)
         try:
             await self._load(hold, packet, moves=True, **how)
         except GivenBeforeStop:
@@ -387,10 +395,3 @@ class RobotRc(ResourceController[P], Generic[P]):
     def _silent_too_long(self) -> bool:
         """Return whether no command has arrived during the sleep."""
         return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s
-
-    def _of_bytes(self, method: str, returned: object) -> object:
-        """Refuse what is not of bytes from a method that returns a packet."""
-        declared = getattr(getattr(self.driver_protocol, method, None), "__annotations__", {}).get("return")
-        if declared in (bytes, "bytes") and not isinstance(returned, bytes | bytearray | memoryview):
-            raise HardwareFault(f"{method} of the protocol of {self.name} returns {type(returned).__name__}, no bytes")
-        return returned

@@ -332,6 +332,7 @@ def test_a_stop_that_is_pressed_again_when_no_holder_is_left_is_confirmed(local_
             assert not (await stop_robot(operator, "scout1", "")).is_confirmed
             over = Disconnect("one", 5, "its radio is gone")
             await pool.manager_voice.ask("resource_pool/scout1", over, Disconnected, within_s=5)
+            await pool.clock.sleep_s(2 * COMMAND_TIMEOUT_S)  # until then its last packet may move it
             again = await stop_robot(operator, "scout1", "")
             assert (again.is_stopped, again.number, again.is_confirmed) == (True, 3, True)
 

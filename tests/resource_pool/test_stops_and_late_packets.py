@@ -1,0 +1,116 @@
+"""A confirmed stop is true: nothing that moves the robot is on the air afterwards."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+from pool_on_local_network import Pool, WiretappedRadio, a_pool
+from pool_orders import command, connect_robot, disconnect
+
+from backbone.bus.clock import run_virtual
+from resource_pool.arc_client import StopState, ask_stop, stop_robot
+from resource_pool.commands import Drive
+from resource_pool.messages import COMMAND_TIMEOUT_S
+from scout_model.radio_link import encode_drive, encode_halt
+
+FORWARD = encode_drive(3.0, 3.0)
+
+
+class DelayingRadio(WiretappedRadio):
+    """Waits for its device within each call."""
+
+    delay_s = 0.0
+
+    async def transmit(self, *packet: Any, **of: Any) -> Any:
+        await asyncio.sleep(self.delay_s)
+        return await super().transmit(*packet, **of)
+
+
+async def stopped(pool: Pool) -> StopState:
+    return await stop_robot(pool.voice_of("ui_console/console-1"), "scout1", "a child", "anna")
+
+
+def drives_after(pool: Pool, since_s: float) -> list[float]:
+    """Return the times of the packets that moved the robot since then."""
+    return [
+        packet.at_s for packet in pool.radio_driver.heard_by(1) if packet.payload == FORWARD and packet.at_s > since_s
+    ]
+
+
+@pytest.mark.parametrize("delay_s", [0.03, 0.2, 0.7, 0.95])
+@pytest.mark.parametrize("offset_s", [0.0, 0.02, 0.15])
+def test_a_packet_that_a_driver_delays_goes_before_the_stop_is_confirmed(
+    local_mission: Any, monkeypatch: pytest.MonkeyPatch, delay_s: float, offset_s: float
+) -> None:
+    monkeypatch.setattr(DelayingRadio, "delay_s", delay_s)
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1"], manager=False) as pool:
+            await pool.rc("radio", driver=f"{__name__}:DelayingRadio")
+            await connect_robot(pool, "one", 1)
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+            await pool.clock.sleep_s(0.21 + offset_s)
+            stop = await stopped(pool)
+            answered_s = pool.clock.now_s()
+            await pool.clock.sleep_s(1.2)
+            assert pool.radio_driver.heard_by(1)[-1].payload == encode_halt()
+            assert not (stop.is_confirmed and drives_after(pool, answered_s))
+            assert stop.is_confirmed is (delay_s < 0.9), "a packet that takes longer than the robot waits is in doubt"
+
+    run_virtual(main())
+
+
+def test_a_stop_is_in_doubt_while_the_radio_may_repeat_what_the_former_holder_loaded(local_mission: Any) -> None:
+    """The RC manager disconnects all RCs at once, but the radio may be late, or cut off."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+            await pool.clock.sleep_s(0.1)
+            await disconnect(pool, "scout1", "one", 1)
+            stop = await stopped(pool)
+            answered_s = pool.clock.now_s()
+            await pool.clock.sleep_s(COMMAND_TIMEOUT_S)
+            assert drives_after(pool, answered_s)
+            assert not stop.is_confirmed
+            await pool.clock.sleep_s(COMMAND_TIMEOUT_S)
+            sure, asked_s = await ask_stop(pool.ear, "scout1"), pool.clock.now_s()
+            await pool.clock.sleep_s(1.0)
+            assert sure.is_confirmed, "and no one had to press again"
+            assert not drives_after(pool, asked_s)
+
+    run_virtual(main())
+
+
+def test_a_restarted_robot_rc_is_in_doubt_for_as_long(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+            await pool.clock.sleep_s(0.1)
+            await pool.kill("scout1")
+            await pool.rc("scout1")
+            stop = await stopped(pool)
+            answered_s = pool.clock.now_s()
+            await pool.clock.sleep_s(COMMAND_TIMEOUT_S)
+            assert drives_after(pool, answered_s)
+            assert not stop.is_confirmed
+            await pool.clock.sleep_s(COMMAND_TIMEOUT_S)
+            assert (await ask_stop(pool.ear, "scout1")).is_confirmed
+
+    run_virtual(main())
+
+
+def test_a_robot_that_stood_at_the_end_of_its_hold_is_stopped_for_certain(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+            await pool.clock.sleep_s(2 * COMMAND_TIMEOUT_S)
+            await disconnect(pool, "scout1", "one", 1)
+            assert (await stopped(pool)).is_confirmed
+
+    run_virtual(main())
