@@ -70,6 +70,9 @@ class RcOfDrivers(Protocol):
     async def driver_exchanged(self) -> None:
         """Bring the driver to the state of the RC."""
 
+    async def driver_proved(self, since_s: float) -> None:
+        """Wait until the driver that took over at this time has done what it is for, or raise ``HardwareFault``."""
+
     def has_driver(self, parameters: msgspec.Struct) -> None:
         """Apply the parameters with another driver."""
 
@@ -193,8 +196,19 @@ class DriverExchanges:
         while not going.course.is_over:
             self._news.clear()
             await set_within(self._news, max(0.0, going.course.due_s - self._now_s()) / self._rc.clock.rate)
+            await self._used(going)
             going.course.let_pass(self._now_s())
         return await (self._proved(going) if going.course.phase is ExchangePhase.PROVED else self._returned(going))
+
+    async def _used(self, going: _DriverExchange) -> None:
+        """At the end of its trial, end the exchange if the new driver has not done what it is for."""
+        since_s = going.course.switched_s
+        if since_s is None or going.course.is_over or self._now_s() < going.course.due_s:
+            return
+        try:
+            await self._rc.driver_proved(since_s)
+        except HardwareFault as idle:
+            self._failed(idle)
 
     def _made(self, asked: SwapClass, slot: DriverSlot, kind: Callable[[DriverSite], object]) -> _DriverExchange:
         """Return the exchange with its new driver, which is not open yet."""
@@ -332,7 +346,8 @@ class DriverExchanges:
             await self._close(going.old)
         self._tell(going.course.outcome(class_path_of(going.old), going.asked.class_path))
         order = ReviseStart(self._rc.name, msgspec.to_builtins(self._rc.parameters))
-        return await revise_start(self._rc.bus, order)
+        idle = "" if going.slot.calls else "nothing was asked of the new driver during its trial"
+        return "; ".join(filter(None, (idle, await revise_start(self._rc.bus, order))))
 
     async def _close(self, driver: object) -> None:
         """Close a driver that is no longer in use; if this fails, log it and go on."""

@@ -43,7 +43,7 @@ from backbone.scheduling.requests import Holder
 from backbone.waiting import only_bugs
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from resource_pool.commands import Command
-from resource_pool.driver_adjusting import adjust_all
+from resource_pool.driver_adjusting import adjust_changed
 from resource_pool.driver_exchange import DriverExchanges
 from resource_pool.driver_slot import Again, DriverSlot, Judge, always, as_returned
 from resource_pool.drivers.interface import (
@@ -54,7 +54,7 @@ from resource_pool.drivers.interface import (
 )
 from resource_pool.hold_ends import FAULTS, SAFE_WITHIN_S, HoldEnds, detail_of
 from resource_pool.holds import Hold, HoldTable
-from resource_pool.messages import Applied, ImpossibleUse, NeedsRestart, NotFromYou
+from resource_pool.messages import Applied, ImpossibleUse, NotFromYou
 from resource_pool.obeyed_commands import command_forms
 from resource_pool.orders_in_progress import applied_values
 from resource_pool.rc_parameters import RcParameters, sort_out_options
@@ -178,6 +178,13 @@ class ResourceController(Component[R], Generic[R]):
 
         When: after a new driver has taken over, or the old one is back. What: restore the driver's state, such as
         tuning, subscriptions or brightness; by default nothing. Not: state that the next command sets anyway.
+        """
+
+    async def driver_proved(self, since_s: float) -> None:
+        """Wait until the driver that took over at this time has done what it is for, if anything was asked of it.
+
+        When: at the end of its trial. What: raise ``HardwareFault`` if it does not within a time limit; by default
+        nothing, because a call of a driver on trial that fails is seen anyway. Override if a driver acts by itself.
         """
 
     def ranked(self, arc: str, epoch: int) -> None:
@@ -308,18 +315,10 @@ class ResourceController(Component[R], Generic[R]):
             NeedsRestart: The running RC cannot change this parameter.
             WrongParameter: The driver refuses its options, or fails while it applies them.
         """
-        before, now = self._in_force, self.parameters
-        changed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)}
-        for_driver = changed & self.driver_parameters
-        fixed = changed - self.driver_parameters - {"capacity"}
-        drivers = [slot.proxy for slot in self._slots]
-        unable = [driver for driver in drivers if not hasattr(driver, "adjust")]
-        if fixed or (for_driver and (unable or not drivers)):
-            raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed or for_driver))} while it runs")
-        if for_driver:
-            site = self.driver_site()
-            adjust_all(drivers, site, dataclasses.replace(site, parameters=before))
-        self._in_force = now
+        site = self.driver_site()
+        former = dataclasses.replace(site, parameters=self._in_force)
+        adjust_changed([slot.proxy for slot in self._slots], site, former, self.driver_parameters)
+        self._in_force = self.parameters
         self.changed()
 
     def has_driver(self, parameters: msgspec.Struct) -> None:

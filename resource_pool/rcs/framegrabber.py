@@ -84,6 +84,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._kinds: Counter[str] = Counter()
         self._silent_since_s = math.inf
         self._newest_s, self._mistimed, self._has_told = -math.inf, 0, False
+        self._tuned_s = self._came_s = -math.inf
         self._shown_s, self._dark_since_s, self._why_dark = -math.inf, math.inf, ""
         self._watched_by = ""
         self._told_dark: set[str] = set()
@@ -115,6 +116,14 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         else:
             self._driver.stop()
 
+    async def driver_proved(self, since_s: float) -> None:
+        """Wait for a picture, if an ARC waits for pictures; see ``ResourceController``."""
+        while self._tuned is not None and self._came_s < (begun_s := max(since_s, self._tuned_s)):
+            due_s = begun_s + self._dark_after_s()
+            if self.clock.now_s() >= due_s:
+                raise HardwareFault(f"the driver of {self.name} delivered no picture in time")
+            await self.clock.sleep_until_s(due_s)
+
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Tune and begin to deliver."""
         if not isinstance(order, Tune):
@@ -128,7 +137,8 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             self._deliver(hold, order, picture, numbers)
 
         self._silent_since_s = math.inf
-        self._newest_s, self._has_told = self.clock.now_s(), False
+        self._newest_s = self._tuned_s = self.clock.now_s()
+        self._has_told = False
         self._tuned = order.frequency, deliver
         self._shown_s, self._dark_since_s, self._why_dark = self.clock.now_s(), math.inf, "its device delivers none"
         self._watched_by = hold.arc
@@ -224,7 +234,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         """Return whether a picture may have this time: not before the last one, not in the future. Count the others."""
         now_s, wrong_s = self.clock.now_s(), WRONG_S * max(1.0, self.clock.rate)
         if self._newest_s <= captured_s <= now_s + wrong_s:
-            self._newest_s = captured_s
+            self._newest_s, self._came_s = captured_s, now_s
             return True
         self._mistimed, self._why_dark = self._mistimed + 1, "its pictures have an impossible time"
         if not self._has_told and not abs(captured_s - now_s) <= wrong_s:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -43,12 +42,8 @@ class WrongClockAlone(WrongClockRadio):
 class TornCamera(FirstCamera):
     """Delivers a picture with fewer pixels than its size says."""
 
-    def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
-        super().tune(frequency, deliver)
-        asyncio.get_running_loop().call_later(0.1, self._deliver, deliver)
-
-    def _deliver(self, deliver: Callable[[Picture], None]) -> None:
-        deliver(Picture(self.site.clock.now_s(), memoryview(b"few"), -7, 5))
+    def _picture(self) -> Picture:
+        return Picture(self.site.clock.now_s(), memoryview(b"few"), -7, 5)
 
 
 class SpeakingProtocol(SimulatedScoutProtocol):
