@@ -5,6 +5,7 @@ Rules of this file:
 * The RC, its holds and their epochs do not take part: only the driver in its slot changes, between two calls.
 * If both drivers set ``opens_beside``, or have nothing to open, the new one is opened beside the old one. Otherwise the
   old one is closed first, and calls wait until a device is open again.
+* A call that hangs in the old driver is cancelled, and the new driver does it.
 * If the new driver fails during its trial, the old driver comes back and repeats the failed call.
 """
 
@@ -39,6 +40,7 @@ from backbone.reading_anew import WrongClass, read_anew
 from backbone.waiting import only_bugs, set_within
 from resource_pool.driver_slot import DriverSlot
 from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions, driver_class, driver_path, methods_of
+from resource_pool.orders_in_progress import CUT_WITHIN_S
 
 log = logging.getLogger(__name__)
 
@@ -261,14 +263,22 @@ class DriverExchanges:
             going.course.fail(self._now_s(), complaint(error))
 
     async def _is_quiet(self, going: _DriverExchange) -> bool:
-        """Wait until no call is in progress; if a call hangs in the old driver, end the exchange."""
-        within_s = self._rc.closed_most_s  # other calls wait meanwhile
+        """Wait until no call is in progress; give up calls that hang in the old driver, or end the exchange."""
+        if await self._is_quiet_within(going.slot, self._rc.closed_most_s):  # other calls wait meanwhile
+            return True
+        going.slot.give_up_calls()
+        if await self._is_quiet_within(going.slot, CUT_WITHIN_S):
+            return True
+        told = f"a call of {class_path_of(going.old)} hangs, even if it is cancelled"
+        remedy = f"a restart helps: 'scout-backbone stop {self._rc.name}', then 'start' with its type"
+        going.course.fail(self._now_s(), f"{told}; {remedy}")
+        return False
+
+    async def _is_quiet_within(self, slot: DriverSlot, within_s: float) -> bool:
         try:
             async with asyncio.timeout(within_s):
-                await going.slot.wait_quiet()
+                await slot.wait_quiet()
         except TimeoutError:
-            told = f"a call of {class_path_of(going.old)} did not end within {within_s:g} s"
-            going.course.fail(self._now_s(), told)
             return False
         return True
 

@@ -5,6 +5,8 @@ Rules of this file:
 * At any instant exactly one driver works: all calls go to this driver, and only its callbacks arrive.
 * A new driver takes over while no call is in progress. While no device is open, asynchronous calls wait, and what
   synchronous calls raise is dropped, because the RC repeats its settings afterwards.
+* A call that hangs in the old driver can be given up: it is cancelled, and the next working driver does it from the
+  start.
 * While a driver is on trial, its bugs and hardware faults, and calls that hang, reach the RC only if the old driver
   cannot do the same call. A value that the RC cannot use, returned or delivered, is a hardware fault too.
 """
@@ -72,6 +74,8 @@ class DriverSlot:
         self._opened.set()
         self._quiet.set()
         self._under_way = 0
+        self._limits: set[asyncio.Timeout] = set()
+        self._given_up: set[asyncio.Timeout] = set()
 
     # ------------------------------------------------------------------ for the exchange
     def shut(self, *, has_device: bool = True) -> None:
@@ -87,6 +91,12 @@ class DriverSlot:
         """Pass calls to the working driver from now on."""
         self.has_device = True
         self._opened.set()
+
+    def give_up_calls(self) -> None:
+        """Cancel the calls in progress; whichever driver works when the gate opens does them from the start."""
+        self._given_up |= self._limits
+        for limit in self._limits:
+            limit.reschedule(asyncio.get_running_loop().time())
 
     async def wait_open(self) -> None:
         """Wait until calls are passed to a driver."""
@@ -118,13 +128,14 @@ class DriverSlot:
     async def call_later(self, name: str, arguments: tuple[object, ...], named: Mapping[str, object]) -> object:
         """Call an asynchronous method."""
         await self._opened.wait()
-        driver, back = self.works, None
+        driver, back, limit = self.works, None, asyncio.timeout(HANGS_S if self.is_tried else None)
         self._under_way += 1
         self._quiet.clear()
         try:
             given = [self._while_works(driver, one) for one in arguments]
             call: Awaitable[object] = getattr(driver, name)(*given, **named)
-            done = await only_bugs(_within(HANGS_S, call) if self.is_tried else call, f"{name} of a driver")
+            self._limits.add(limit)
+            done = await only_bugs(_within(limit, call), f"{name} of a driver")
             done = self._judge(name, done)
             self.calls += 1
             return done
@@ -132,9 +143,11 @@ class DriverSlot:
             fault = HardwareFault(f"{name} took longer than {HANGS_S} s") if isinstance(error, TimeoutError) else error
             if not _is_no_fault(error) and self.works is driver:
                 back = self.on_trial(fault)
-            if back is None and self.works is driver:
+            if back is None and self.works is driver and limit not in self._given_up:
                 raise
         finally:
+            self._limits.discard(limit)
+            self._given_up.discard(limit)
             self._under_way -= 1
             if not self._under_way:
                 self._quiet.set()
@@ -164,8 +177,8 @@ class DriverSlot:
         return heard
 
 
-async def _within(within_s: float, call: Awaitable[object]) -> object:
-    async with asyncio.timeout(within_s):
+async def _within(limit: asyncio.Timeout, call: Awaitable[object]) -> object:
+    async with limit:
         return await call
 
 

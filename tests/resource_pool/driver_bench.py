@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import ClassVar
 
 
@@ -12,6 +13,7 @@ class Bench:
     shone: ClassVar[list[tuple[str, float]]] = []
     most_open: ClassVar[int] = 0
     fault: ClassVar[str] = ""
+    end_deaf: ClassVar[asyncio.Event] = asyncio.Event()
     tuned: ClassVar[dict[str, str]] = {}
     """Open camera → its frequency."""
 
@@ -20,4 +22,4 @@ class Bench:
         cls.opened.clear()
         cls.shone.clear()
         cls.tuned.clear()
-        cls.most_open, cls.fault = 0, ""
+        cls.most_open, cls.fault, cls.end_deaf = 0, "", asyncio.Event()

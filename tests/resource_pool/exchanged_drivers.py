@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 
 import msgspec
@@ -24,6 +25,8 @@ class First:
         self.count += 1
         if Bench.fault == "stuck":
             await asyncio.Event().wait()
+        if Bench.fault == "deaf":
+            await deaf()
         await asyncio.sleep(0.01)
         Bench.shone.append((self.who, share))
 
@@ -42,6 +45,13 @@ async def cut() -> None:
     reading = asyncio.ensure_future(asyncio.Event().wait())
     reading.cancel()
     await reading
+
+
+async def deaf() -> None:
+    """Wait for the bench, whoever cancels this."""
+    while not Bench.end_deaf.is_set():
+        with contextlib.suppress(asyncio.CancelledError):
+            await Bench.end_deaf.wait()
 
 
 class Second(First):

@@ -210,32 +210,6 @@ def test_an_old_driver_that_hangs_when_its_state_is_restored_ends_the_rc(local_m
     bench(local_mission, "First", scene)
 
 
-@pytest.mark.parametrize(("old", "new"), PAIRS)
-def test_a_call_that_hangs_in_the_old_driver_ends_the_exchange(local_mission: Any, old: str, new: str) -> None:
-    """Otherwise all further calls wait, and the exchange ends no sooner than the hold."""
-
-    async def scene(pool: Pool) -> None:
-        await shine(pool, 0.5)
-        Bench.fault = "stuck"
-        hanging = asyncio.create_task(shine(pool, 0.6))
-        await pool.clock.sleep_s(0.1)
-        swapping = asyncio.create_task(swap(pool, new))
-        await pool.clock.sleep_s(1.0)
-        Bench.fault = ""
-        await shine(pool, 0.7)
-        assert Bench.shone[-1] == (old, 0.7)
-        swapped = await asyncio.wait_for(swapping, 5.0)
-        assert not swapped.is_proved
-        assert f"a call of {DRIVERS}:{old} did not end" in swapped.cause
-        assert Bench.opened in ([], [old]), "the old one was neither closed nor opened again"
-        await asyncio.gather(hanging, return_exceptions=True)
-        await pool.manager_voice.ask(AT, Disconnect("one", 1), Disconnected, within_s=1)
-        assert Bench.shone[-1] == (old, 0.0)
-        assert (await swap(pool, new)).is_proved
-
-    bench(local_mission, old, scene)
-
-
 EVENTS = st.lists(
     st.tuples(st.sampled_from(["shine", "connect", "disconnect", "swap"]), st.sampled_from(["", *FAULTS])), max_size=10
 )
