@@ -92,7 +92,9 @@ class RadioDriver(Protocol):
     async def transmit(
         self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
     ) -> float | None:
-        """Send the packet and return when it is on the air. Not: queue it. Arguments after ``payload`` are for audits.
+        """Send the packet and return when it is on the air. Arguments after ``payload`` are for audits.
+
+        Not: queue it, or send it after the call was cancelled; else a robot drives after its stop was confirmed.
 
         Returns:
             Time on the air, in mission seconds from the call on, 0 to 10; the RC manager plans with it if it is longer
