@@ -64,12 +64,14 @@ class RoverRc(RobotRc[RobotParameters]):
     camera = CameraForm(
         forward_m=0.165, height_m=WHEEL_RADIUS_M + 0.1275, tilt_rad=CAMERA_TILT_RAD, across_rad=HORIZONTAL_VIEW_RAD
     )
-    body_class, driver_protocol = "resource_pool.robots.rover.body:Rover", RoverProtocol
+    body_class = "resource_pool.robots.rover.body:Rover"
+    driver_protocol = RoverProtocol
     moves_on_s = LIFT_M / LIFT_M_S  # the lift is slower than the paddles
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {
         "forward_m_s": (-TOP_M_S, TOP_M_S),
         "turn_rad_s": (-TOP_RAD_S, TOP_RAD_S),
-        **dict.fromkeys(("closed", "lift"), (0.0, 1.0)),
+        "closed": (0.0, 1.0),
+        "lift": (0.0, 1.0),
     }
     _protocol: RoverProtocol
 

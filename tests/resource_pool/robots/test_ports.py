@@ -8,7 +8,7 @@ from port_of import Port
 ROVER = Port(
     "rover",
     "mixed.xml",
-    most_lines={"rc.py": 90, "arcs.py": 35},  # chosen: what is written for RC and ARCs in a morning, with docstrings
+    most_lines={"rc.py": 100, "arcs.py": 35},  # chosen: what is written for RC and ARCs in a morning, with docstrings
 )
 WALKER = Port(
     "walker",
