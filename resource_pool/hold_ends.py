@@ -1,14 +1,18 @@
 """HoldEnds: brings an RC's resource into its safe state at every end of a hold, and records failures.
 
-Rule of this file: if a hold did not end safely, the RC retries the safe state before the next connection.
+Rules of this file:
+
+* If a hold did not end safely, the RC retries the safe state before the next connection.
+* A command that goes on although it was cancelled may act on the resource at any time. The resource is not safe before
+  its end, and is brought into its safe state then.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Awaitable, Sequence
+from typing import Protocol, TypeVar
 
 from backbone.component.messages import LogLevel
 from backbone.component.story import StoryBook
@@ -20,6 +24,7 @@ from resource_pool.orders_in_progress import OrdersInProgress
 
 log = logging.getLogger(__name__)
 
+T = TypeVar("T")
 SAFE_WITHIN_S = 0.4  # chosen: below the RC manager's limit, so that the RC manager gets the reason; machine seconds
 FAULTS = (Refusal, LinkError, TimeoutError)
 """Of a hook of a hold: the hardware, or a component that the hook asked, does not obey. All others are bugs."""
@@ -54,10 +59,12 @@ class HoldEnds:
     Attributes:
         faults: Number of attempts that did not reach the safe state.
         orders: The commands that the RC is carrying out.
+        changing: Held while a hold begins or ends.
     """
 
     def __init__(self, rc: RcOfHolds) -> None:
         self.faults, self.orders = 0, OrdersInProgress(rc.name)
+        self.changing = asyncio.Lock()
         self._rc = rc
         self._unsafe: dict[str, Hold] = {}
         self._remark = ""
@@ -70,6 +77,21 @@ class HoldEnds:
         """Return the ended hold of this ARC if the resource is still unsafe after it."""
         return self._unsafe.get(arc)
 
+    async def carry_out(self, hold: Hold, work: Awaitable[T]) -> T:
+        """Return the result of a command's work.
+
+        Raises:
+            StaleEpoch: The hold ended first; the work was cancelled.
+            HardwareFault: The work went on nevertheless, and the resource is not safe after it.
+        """
+        try:
+            return await self.orders.run(hold, work)
+        finally:
+            if self.orders.went_on():
+                async with self.changing:
+                    if self._unsafe.get(hold.arc) is hold:
+                        await self.end(hold, "its last command has ended")
+
     async def end(self, hold: Hold, reason: str) -> None:
         """Bring the resource of the ended hold into its safe state.
 
@@ -81,8 +103,10 @@ class HoldEnds:
         self._unsafe[hold.arc] = hold
         try:
             async with asyncio.timeout(SAFE_WITHIN_S):
-                await self.orders.cut_off(hold)
+                have_ended = await self.orders.cut_off(hold)
                 await only_bugs(rc.make_safe(hold), f"make_safe of {rc.name}")
+            if not have_ended:
+                raise HardwareFault("a command goes on although it was cancelled")
         except Exception as error:
             detail = detail_of(error)
             self.faults += 1

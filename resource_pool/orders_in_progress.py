@@ -38,38 +38,51 @@ class OrdersInProgress:
         self._rc = rc
         self._going: dict[asyncio.Task[object], Hold] = {}
         self._cut: set[asyncio.Task[object]] = set()
+        self._deaf: set[asyncio.Task[object]] = set()
 
     async def run(self, hold: Hold, work: Awaitable[T]) -> T:
         """Return the result of the work.
 
         Raises:
-            StaleEpoch: The hold ended first; the work was cancelled.
+            StaleEpoch: The hold ended first; the work was cancelled, even if it went on.
         """
         task = asyncio.current_task()
         assert task is not None  # noqa: S101  a coroutine runs in a task
         self._going[task] = hold
+        lost = StaleEpoch(f"{hold.arc} lost {self._rc} before its command was carried out", epoch=hold.epoch)
         try:
-            return await work
+            done = await work
         except asyncio.CancelledError:
             if task not in self._cut or task.uncancel():  # another caller cancelled the task, too
                 raise
-            raise StaleEpoch(
-                f"{hold.arc} lost {self._rc} before its command was carried out", epoch=hold.epoch
-            ) from None
+            raise lost from None
+        else:
+            if task not in self._cut:
+                return done
+            task.uncancel()
+            raise lost
         finally:
             del self._going[task]
             self._cut.discard(task)
 
-    async def cut_off(self, hold: Hold) -> None:
-        """Cancel the commands of this hold; return when they have ended, or go on for ``CUT_WITHIN_S``."""
-        going = [
+    async def cut_off(self, hold: Hold) -> bool:
+        """Cancel the commands of this hold; return whether all have ended within ``CUT_WITHIN_S``."""
+        going = {
             task
             for task, under in self._going.items()
             if (under.arc, under.epoch) == (hold.arc, hold.epoch) and task is not asyncio.current_task()
-        ]
-        if not going:
-            return
-        for task in going:
-            self._cut.add(task)
+        }
+        for task in going - self._cut:
             task.cancel()
-        await asyncio.wait(going, timeout=CUT_WITHIN_S)
+        self._cut |= going
+        if going:
+            await asyncio.wait(going, timeout=CUT_WITHIN_S)
+        self._deaf |= going & self._going.keys()
+        return not going & self._going.keys()
+
+    def went_on(self) -> bool:
+        """Return whether the command of the present task has ended, but later than ``cut_off`` waited."""
+        task = asyncio.current_task()
+        is_deaf = task in self._deaf
+        self._deaf -= {task}
+        return is_deaf

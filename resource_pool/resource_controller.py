@@ -115,7 +115,6 @@ class ResourceController(Component[R], Generic[R]):
         self._in_force = self.parameters
         self._slots: list[DriverSlot] = []
         self._exchanges = DriverExchanges(self)
-        self._changing = asyncio.Lock()
         self._lease_changed = asyncio.Event()
 
     @classmethod
@@ -170,7 +169,7 @@ class ResourceController(Component[R], Generic[R]):
             return await super().answer(asked)
         hold = self.admit(order.arc, order.epoch)
         self.permit(order)
-        given = await self._ends.orders.run(hold, self.obey(hold, order))
+        given = await self._ends.carry_out(hold, self.obey(hold, order))
         return Applied(self.name, hold.epoch, self.clock.now_s(), order.word(), applied_values(given, order.word()))
 
     async def driver_exchanged(self) -> None:
@@ -267,7 +266,7 @@ class ResourceController(Component[R], Generic[R]):
                 await self._lease_changed.wait()
                 continue
             await self.clock.sleep_until_s(expiry_s)
-            async with self._changing:
+            async with self._ends.changing:
                 over = self.holds.expire(self.clock.now_s())
                 self._lease_ends += len(over)
                 for hold in over:
@@ -276,7 +275,7 @@ class ResourceController(Component[R], Generic[R]):
 
     async def drain(self) -> None:
         """End all holds; bring the resource into its safe state if the hardware obeys."""
-        async with self._changing:
+        async with self._ends.changing:
             ended = [self.holds.disconnect(hold.arc, hold.epoch) for hold in self.holds.holds()]
             still = [*self._ends.left(), *(hold for hold in ended if hold is not None)]
             await self._ends.end_all(still, "the RC ends")
@@ -291,7 +290,7 @@ class ResourceController(Component[R], Generic[R]):
             case Connect() as order:
                 return await self._connect(order, asked.stamp_s)
             case Disconnect(arc=arc, epoch=epoch, reason=reason):
-                async with self._changing:
+                async with self._ends.changing:
                     hold = self.holds.disconnect(arc, epoch) or self._ends.unsafe(arc)
                     if hold is not None:
                         await self._ends.end(hold, reason)
@@ -361,7 +360,7 @@ class ResourceController(Component[R], Generic[R]):
     async def _connect(self, order: Connect, given_s: float) -> Connected:
         if not 0 < order.lease_s <= LONGEST_LEASE_S:
             raise ImpossibleUse(f"{self.name}: a lease of {order.lease_s} s for {order.arc}")
-        async with self._changing:
+        async with self._ends.changing:
             # Count from the order's own time stamp: the RC manager relies on that end, even if the order arrived late.
             since_s = self.clock.now_s()
             lease_until_s = min(given_s, since_s) + order.lease_s

@@ -248,7 +248,14 @@ def test_a_command_in_progress_does_not_follow_the_safe_state(local_mission: Any
     run_virtual(main())
 
 
-def test_a_command_that_goes_on_after_its_cancellation_does_not_hold_up_the_safe_state(local_mission: Any) -> None:
+def _lit(lamp: Lamp) -> list[str]:
+    """Return what the lamp's driver has told of."""
+    return [event.what for event in lamp.story.of("lights") if event.what.startswith(("shines", "is dark"))]
+
+
+def test_a_command_that_goes_on_after_its_cancellation_is_followed_by_the_safe_state(local_mission: Any) -> None:
+    """Otherwise the lamp shines without a holder, and the RC manager took it for dark."""
+
     async def main() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
             lamp = await pool.start(WarmingLamp, "lights", {"driver": "resource_pool.rcs.skeleton:PaintedLamp"})
@@ -257,8 +264,15 @@ def test_a_command_that_goes_on_after_its_cancellation_does_not_hold_up_the_safe
             shine = Shine(1.0).under("one", 1)
             shining = asyncio.create_task(pool.voice("one").ask("resource_pool/lights", shine, Applied, within_s=1.0))
             await pool.clock.sleep_s(0.05)
+            for _ in range(2):
+                with pytest.raises(HardwareFault, match="a command goes on although it was cancelled"):
+                    await _order(pool, Disconnect("one", 1), Disconnected)
+                assert _lit(lamp)[-1] == "is dark", "at once, and again afterwards"
+            with pytest.raises(StaleEpoch):
+                await shining
+            assert _lit(lamp)[-2:] == ["shines white at 100%", "is dark"]
             await _order(pool, Disconnect("one", 1), Disconnected)
-            assert lamp.story.of("lights")[-1].what == "is dark"
-            await shining
+            lamp.hurried = True
+            await _order(pool, Connect("two", 2, LEASE_S, RcUse(), {}), Connected)
 
     run_virtual(main())
