@@ -27,7 +27,7 @@ from backbone.component.messages import Absence, LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.ranges import MOST_PX
+from backbone.ranges import LONGEST_MENTION, MOST_PX
 from resource_pool.commands import Command, Tune
 from resource_pool.drivers.interface import FramegrabberDriver, HardwareFault, Picture, open_device
 from resource_pool.holds import Hold
@@ -41,6 +41,8 @@ WRONG_S = 1.0  # chosen: more than clocks of hosts differ, and than a driver del
 DARK_S = 2.0  # chosen: four times SILENT_S, after which a transmitter is switched on again; machine seconds
 DARK_PICTURES = 3  # chosen: so many pictures may be missing at a low rate
 LEAST_PX = 2  # chosen: vision halves pictures; a smaller one comes of a driver that got none
+LONGEST_WORD = LONGEST_MENTION - len("frames_")  # a kind is part of a statistic's name
+MOST_KINDS = 64  # chosen: a grabber knows a handful of faults
 ARC_REPLY_S = 1.0  # chosen: the ARC asks a robot before it answers; machine seconds
 
 
@@ -191,7 +193,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             return  # a driver may deliver one picture after its stop
         try:
             self._take(hold, order, picture, numbers)
-        except (ValueError, TypeError) as wrong:
+        except (ValueError, TypeError, AttributeError) as wrong:
             raise HardwareFault(f"the driver of {self.name} delivers a wrong picture: {wrong}") from wrong
 
     def _take(self, hold: Hold, order: Tune, picture: Picture, numbers: Iterator[int]) -> None:
@@ -200,11 +202,15 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         Raises:
             ValueError: It has no legal size, or other pixels than its size says.
             TypeError: A value is not of the type that ``Picture`` declares.
+            AttributeError: It is no ``Picture``.
         """
+        for word in (picture.robot, picture.kind):
+            if not isinstance(word, str) or len(word) > LONGEST_WORD:
+                raise TypeError(f"its robot or kind is {word!r:.40}, no name")
         if not self._is_in_time(picture.captured_s):
             return
         if picture.kind:
-            self._kinds[picture.kind] += 1
+            self._kinds[picture.kind if picture.kind in self._kinds or len(self._kinds) < MOST_KINDS else "other"] += 1
         if picture.transmitters == 0:
             self._heard_nothing(hold)
         else:

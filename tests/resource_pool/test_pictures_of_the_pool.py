@@ -13,7 +13,7 @@ from pool_on_local_network import Pool, a_pool
 from pool_orders import EVERYTHING, at, connect, disconnect
 
 from backbone.bus.clock import run_virtual
-from backbone.component.messages import StoryEvent
+from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from resource_pool.commands import Tune
@@ -115,8 +115,18 @@ def test_a_driver_that_delivers_a_picture_of_no_size_ends_the_rc_and_no_behavior
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"width_px": 6.0}, {"height_px": None}, {"captured_s": None}, {"captured_s": "1"}, {"transmitters": None}],
-    ids=str,
+    [
+        {"width_px": 6.0},
+        {"height_px": None},
+        {"captured_s": None},
+        {"captured_s": "1"},
+        {"transmitters": None},
+        {"robot": 5},
+        {"robot": "x" * 256},
+        {"kind": 5},
+        {"kind": "x" * 256},
+    ],
+    ids=lambda wrong: f"{wrong}"[:20],
 )
 def test_a_value_of_another_type_than_declared_ends_the_rc_and_is_not_lost_in_a_callback(
     local_mission: Any, wrong: dict[str, Any]
@@ -129,6 +139,40 @@ def test_a_value_of_another_type_than_declared_ends_the_rc_and_is_not_lost_in_a_
             bug = await pool.outcome("grabber")
             assert isinstance(bug, HardwareFault)
             assert "delivers a wrong picture" in str(bug)
+
+    run_virtual(main())
+
+
+def test_a_picture_that_is_none_ends_the_rc(local_mission: Any) -> None:
+    """OpenCV returns None for a picture that it did not get."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["grabber"], manager=False) as pool:
+            await delivered(pool, bytes(24))
+            deliver: Any = pool.grabber_driver.deliver
+            asyncio.get_running_loop().call_soon_threadsafe(deliver, None)
+            bug = await pool.outcome("grabber")
+            assert "delivers a wrong picture" in str(bug)
+
+    run_virtual(main())
+
+
+def test_kinds_without_number_are_counted_together(local_mission: Any) -> None:
+    """Otherwise the statistics of a driver with a name for each picture become too long for a message."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["grabber"], manager=False) as pool:
+            await delivered(pool, bytes(24), kind="torn")
+            driver = pool.grabber_driver
+            assert driver.deliver is not None
+            for number in range(500):
+                await pool.clock.sleep_s(1e-3)
+                driver.deliver(dataclasses.replace(driver.picture(), kind=f"noise of {number}"))
+            told = await pool.ear.ask(at("grabber"), AskStatistics(), Statistics, within_s=1)
+            assert len(told.values) < 256
+            assert told.values["frames_torn"] == 1
+            assert sum(count for name, count in told.values.items() if name.startswith("frames_noise")) < 500
+            assert told.values["frames_other"] > 400
 
     run_virtual(main())
 
