@@ -63,7 +63,8 @@ Document = Annotated[str, Meta(max_length=LONGEST_DOCUMENT)]
 """A whole file."""
 
 # ---------------------------------------------------------------------- bytes
-Payload = Annotated[bytes, Meta(max_length=4_096)]  # chosen: forty times the radio's longest packet
+MOST_PAYLOAD_BYTES = 4_096  # chosen: forty times the radio's longest packet
+Payload = Annotated[bytes, Meta(max_length=MOST_PAYLOAD_BYTES)]
 StateVector = Annotated[bytes, Meta(max_length=524_288)]  # chosen: 65 536 numbers; three Scouts need 700
 MOST_QUOTED_BYTES = 4_000_000  # chosen: two of them fit a message
 Quoted = Annotated[bytes, Meta(max_length=MOST_QUOTED_BYTES)]

@@ -32,6 +32,7 @@ from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address, component_of
+from backbone.ranges import MOST_PAYLOAD_BYTES
 from backbone.rc_manager.messages import LONGEST_PACKET_S, RcState, StaleEpoch
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
@@ -249,9 +250,15 @@ class CommandRadio(ResourceController[RcParameters]):
                 self._driver.hear(network_id, functools.partial(self._heard, network_id))
 
     def _heard(self, network_id: int, payload: bytes) -> None:
-        """Publish a reply; if there are no bytes, count a lost reply."""
+        """Publish a reply; if there are no bytes, count a lost reply.
+
+        Raises:
+            HardwareFault: The driver delivers something else.
+        """
+        if not isinstance(payload, bytes | bytearray | memoryview) or len(payload) > MOST_PAYLOAD_BYTES:
+            raise HardwareFault(f"the driver of {self.name} delivers {payload!r:.40}, no reply of a robot")
         if payload:
-            self.bus.publish(self.address, Conversation.REPLIES, Reply(network_id, payload))
+            self.bus.publish(self.address, Conversation.REPLIES, Reply(network_id, bytes(payload)))
         news = self._links.heard(network_id) if payload else self._links.lost(network_id)
         if news is not LinkNews.NONE:
             level = LogLevel.WARNING if news is LinkNews.SILENT else LogLevel.NOTICE
