@@ -249,7 +249,7 @@ class CommandRadio(ResourceController[RcParameters]):
             for network_id in sorted(self._heard_robots):
                 self._driver.hear(network_id, functools.partial(self._heard, network_id))
 
-    def _heard(self, network_id: int, payload: bytes) -> None:
+    def _heard(self, network_id: int, payload: object) -> None:
         """Publish a reply; if there are no bytes, count a lost reply.
 
         Raises:

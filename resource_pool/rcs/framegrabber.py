@@ -204,7 +204,8 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             TypeError: A value is not of the type that ``Picture`` declares.
             AttributeError: It is no ``Picture``.
         """
-        for word in (picture.robot, picture.kind):
+        words: tuple[object, ...] = picture.robot, picture.kind  # a driver may deliver anything
+        for word in words:
             if not isinstance(word, str) or len(word) > LONGEST_WORD:
                 raise TypeError(f"its robot or kind is {word!r:.40}, no name")
         if not self._is_in_time(picture.captured_s):
