@@ -34,15 +34,13 @@ class StopLatch:
     def stop(self, by: str, reason: str, now_s: float, console: str = "") -> bool:
         """Stop the robot; return True if the robot could move, or if this author had not stopped it yet.
 
-        A stop of a robot that could move is not confirmed yet.
-
         Args:
             by: Name of the operator, for people.
             console: Address of the operator's console.
         """
         state, author = self.state, Stopper(by, console)
         if not state.is_stopped:
-            self.state = StopState(state.rc, True, state.number + 1, by, reason, now_s, False, console)
+            self.state = StopState(state.rc, True, state.number + 1, by, reason, now_s, console=console)
             return True
         is_new = author not in (Stopper(state.by, state.console), *state.also)
         also = _fitting([*state.also, author]) if is_new else state.also

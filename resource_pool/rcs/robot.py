@@ -42,7 +42,6 @@ OPERATORS = (f"{Subsystem.UI_CONSOLE}/", f"{Subsystem.BACKBONE}/")
 """Subsystems whose components may stop any robot without a grant, because they act for people."""
 
 RADIO_REPLY_S = 0.5  # chosen: a radio that needs longer for one packet counts as absent
-GOES_ON_S = 2 * COMMAND_TIMEOUT_S  # the radio repeats a packet for so long at most, and the robot obeys the last one
 
 
 class NoRadio(Refusal):
@@ -85,7 +84,8 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._halt_at_s: float | None = None
         self._driven = asyncio.Event()
         self._holder: Hold | None = None
-        self._at_rest_s = self._born_s + max(self.moves_on_s, GOES_ON_S)  # its former process may have moved it
+        self._moved_until_s = self._born_s + COMMAND_TIMEOUT_S  # its former process may have moved it
+        self._at_rest_s = self._born_s + max(self.moves_on_s, COMMAND_TIMEOUT_S)
         self._frequency = ""
         self._timeouts = 0
         self._stop_file = StopFile(launch.run_directory, self.name)
@@ -127,7 +127,8 @@ class RobotRc(ResourceController[P], Generic[P]):
     async def make_safe(self, hold: Hold) -> None:
         """Send no further command; the radio sends the safe packet when the radio is disconnected."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
-        self._at_rest_s = max(self._at_rest_s, self.clock.now_s() + self.moves_on_s)
+        now_s = self.clock.now_s()
+        self._at_rest_s = max(now_s + self.moves_on_s, min(self._moved_until_s, now_s + COMMAND_TIMEOUT_S))
         self.cease()
         self._tell_halted(hold)
 
@@ -246,7 +247,9 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     async def _stop_now(self, by: str, reason: str, console: str) -> StopState:
         """Refuse all further motion, and stop the wheels if a holder may be turning them."""
+        was = self._latch.state
         is_new = self._latch.stop(by, reason, self.clock.now_s(), console)
+        self._latch.confirm(was.is_stopped and was.is_confirmed)
         self._keep_stop()
         self._halt_at_s = None
         self.cease()
@@ -254,10 +257,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         if holder is not None:
             try:
                 await self._load(holder, self.stop_packet())
-            except (
-                Refusal,
-                LinkError,
-            ) as error:  # the robot halts by itself when its last drive packet expires
+            except (Refusal, LinkError) as error:  # the robot halts by itself when its last drive expires
                 self.story.note(holder.arc, f"the stop was not sent: {error}")
                 self._latch.confirm(False)
             else:
@@ -265,6 +265,8 @@ class RobotRc(ResourceController[P], Generic[P]):
                 self._tell_halted(holder)
         else:
             # A former holder's last packet was a safe one, or the radio was late, or sends no more.
+            most_s = self.clock.now_s() + RADIO_REPLY_S * self.clock.rate
+            await self.clock.sleep_until_s(min(self._at_rest_s, most_s))
             self._latch.confirm(self.clock.now_s() >= self._at_rest_s)
             self._confirm_at_rest()
         self._publish_stop()
@@ -330,7 +332,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     async def _move(self, hold: Hold, order: Command, packet: bytes, **how: Any) -> None:
         self.permit(order)  # again, because ``obey`` may have waited since
-        self._at_rest_s = max(self._at_rest_s, self.clock.now_s() + GOES_ON_S)
+        self._moved_until_s = self.clock.now_s() + 2 * COMMAND_TIMEOUT_S  # repeated, and obeyed for so long each
         try:
             await self._load(hold, packet, moves=True, **how)
         except GivenBeforeStop:

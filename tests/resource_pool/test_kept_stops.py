@@ -14,6 +14,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.wire import Envelope
 from resource_pool.arc_client import ask_stop, lift_stop, stop_robot
+from resource_pool.messages import COMMAND_TIMEOUT_S
 from resource_pool.rcs.scout import Scout
 from resource_pool.stop_file import StopFile
 
@@ -44,6 +45,7 @@ def test_a_stop_outlives_the_process_of_the_robots_rc(local_mission: Any, beside
             async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
                 stop = await stop_robot(operator, "scout1", "fire", "anna")
             async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
+                await pool.clock.sleep_s(COMMAND_TIMEOUT_S)  # as long as the radio may repeat a drive
                 assert await ask_stop(operator, "scout1") == stop
                 await lift_stop(operator, stop)
             async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)):
