@@ -153,10 +153,10 @@ class RcWatch:
         async def again() -> None:
             self._meeting[rc] += 1
             try:
-                is_up = await self.meet(rc)
+                await self.meet(rc)
             finally:
                 self._meeting[rc] -= 1
-            if not is_up:
+            if rc not in self.up:  # another check at the same time may have found it up
                 self.meet_in_a_while(rc)
 
         self._service.start_task(again(), f"meet {rc}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
+from collections import Counter
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -71,9 +72,13 @@ class PlainRc(Component[Any]):
         self.last_epoch = 0
         self.log: list[tuple[str, str]] = []
         self.hangs = self.does_not_obey = self.is_broken = False
+        self.loses: Counter[type[Message]] = Counter()
         self.tells: Callable[[RcState], RcState] = lambda state: state
 
     async def answer(self, asked: Envelope[Any]) -> Message:
+        if self.loses[type(asked.body)]:
+            self.loses[type(asked.body)] -= 1
+            await self.clock.sleep_s(60.0)
         if self.hangs:
             await self.clock.sleep_s(60.0)
         match asked.body:
@@ -176,12 +181,13 @@ class Pool:
         await self.stack.enter_async_context(self.beside(arc))
         return arc
 
-    async def rc(self, resource: Resource) -> PlainRc:
+    async def rc(self, resource: Resource, loses: Iterable[type[Message]] = ()) -> PlainRc:
         launch = self.launch(Subsystem.RESOURCE_POOL, resource.name, resource.type)
         rc = PlainRc(launch, self.network.join(launch.address, self.clock), self.clock)
         rc.sharable = resource.sharable
         await self.stack.enter_async_context(self.beside(rc))
         self.rcs[resource.name] = rc
+        rc.loses.update(loses)
         return rc
 
     def manager(self) -> RcManager:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from rc_manager_at_work import request
+from rc_manager_at_work import HARDWARE, request
 
-from backbone.addresses import RC_MANAGER
+from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import Absence, AskState, ComponentState
 from backbone.errors import Refusal
 from backbone.keys import Conversation
-from backbone.rc_manager.messages import RcState
+from backbone.placer.messages import Start, Started
+from backbone.rc_manager.messages import AskRc, RcState
 from backbone.rc_manager.rc_watch import MEET_LATEST_S
 from backbone.scheduling.requests import LEASE_S
+from backbone.wire import Envelope, Message
 
 
 class NotReady(Refusal):
@@ -109,5 +111,30 @@ def test_an_arc_that_the_radio_could_not_serve_even_alone_is_named(pool: Any) ->
             absence = (await _absent(fast))["fast"]
             assert absence.cause == "radio could not serve it even alone"
             assert absence.doing == "waits until the capacity of radio grows"
+
+    run_virtual(main())
+
+
+def test_an_rc_that_was_checked_twice_at_once_is_not_absent_if_one_check_found_it(pool: Any) -> None:
+    """It appeared, and the placer had started it: the check without an answer ended last, and named it for good."""
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            holder = await here.arc("holder")
+            placer = here.network.join(PLACER, here.clock)
+
+            async def answer(_asked: Envelope[Start]) -> Message:
+                left = await here.rc(HARDWARE[0], loses=[AskRc])
+                return Started(left.address, "here", 1, [])
+
+            placer.serve(PLACER, Start, answer)
+            here.rcs["left"].end("it is killed")
+            await here.clock.sleep_s(0.1)
+            await holder.ask_for(request("holder", "left"))
+            for _ in range(40):
+                await here.clock.sleep_s(0.1)
+                assert holder.is_open
+                assert not await _absent(holder)
+            await placer.close()
 
     run_virtual(main())
