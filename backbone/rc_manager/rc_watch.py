@@ -289,9 +289,11 @@ class RcWatch:
     def _put_aside(self, rc: str, fault: str) -> None:
         """Plan nothing on this RC until it is credible, and continue with the others."""
         self.up.discard(rc)
-        if self._failures.put_aside.get(rc) != fault:
+        before = self._failures.put_aside.get(rc)
+        if before != fault:
+            self._service.happened(RcWentDown(rc, fault))
+        if before is None:  # each answer may have another number in it
             self._failures.put_aside[rc] = fault
             log.warning("%s is put aside: %s", rc, fault)
             self._service.publish_event(rc, f"is put aside: {fault}", LogLevel.WARNING)
-            self._service.happened(RcWentDown(rc, fault))
         self.meet_in_a_while(rc)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from pathlib import Path
@@ -200,3 +201,18 @@ async def why(here: Pool, name: str) -> Why:
     reasons = await asker.ask(RC_MANAGER, AskWhy(name), Why, within_s=1)
     await asker.close()
     return reasons
+
+
+def test_an_rc_whose_nonsense_differs_each_time_is_reported_once(
+    local_mission: Any, beside: Any, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, beside, tmp_path / "trace.jsonl") as here, here.beside(here.manager()):
+            epochs = itertools.count(2**61)
+            tell(here, "video", lambda state: replace(state, last_epoch=next(epochs)))
+            await here.clock.sleep_s(5.0)
+            latest = next(epochs) - 1
+            assert f"it reports epoch {latest}" in (await why(here, "video")).lines[0]
+
+    run_virtual(main())
+    assert len([line for line in caplog.messages if "is put aside" in line]) == 1
