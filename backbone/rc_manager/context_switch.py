@@ -136,6 +136,8 @@ class ContextSwitch:
             True if the RC confirmed the end of all holds.
         """
         left = self._left[rc]
+        for over in [hold for hold, until_s in left.items() if until_s <= self._clock.now_s()]:
+            del left[over]
         while holds := [*dict.fromkeys([*found, *(one for one in left if left[one] > self._clock.now_s())])]:
             if await self._disconnect(holds, "held from before it was down", math.inf):
                 return False
