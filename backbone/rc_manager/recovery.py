@@ -91,10 +91,13 @@ def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
         state: The RC's report; None: it is not up.
     """
     return RcKnown(
+    Its capacity is the larger of the declared and the reported one, because its holders may have been connected before
+    it was lowered. The caller reports the present capacity after these.
+
         rc=resource.name,
         kind=resource.type,
         sharable=resource.sharable,
-        capacity=resource.capacity if state is None else state.capacity,
+        capacity=resource.capacity if state is None else max(resource.capacity, state.capacity),
         connect_s=resource.connect_s,
         disconnect_s=resource.disconnect_s,
         up=state is not None,

@@ -283,6 +283,8 @@ class RcManager(Component[RcManagerParameters]):
         for at_s, event in adopted:
             self._arcs.remember(event.request.arc)
             self.happened(event, at_s)
+        for state in found.rcs.values():
+            self.happened(CapacityChanged(state.name, state.capacity))
         for _, event in adopted:
             if event.request.idle:  # it sent that while no RC manager answered
                 self.happened(Idled(event.request.arc))
