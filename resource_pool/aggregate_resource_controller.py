@@ -319,7 +319,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     def _shut(self, reason: str, by: str, expected_s: float) -> None:
         """Close the gate, and notify the owner if it was open."""
-        was_open = self._gate.is_open
+        was_open, granted_s = self._gate.is_open, self._gate.granted_s
         self._gate.close(reason, by, expected_s)
         if self._offering is not None:
             self._offering.cancel()
@@ -330,6 +330,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     def _longest_s(self) -> float:
         return max(self.parameters.minimum_runtime_s, self.parameters.maximum_runtime_s)
+            self._placed.slice_ended(granted_s)
 
     # ------------------------------------------------------------------ commands
     async def _command(self, command: Command) -> Applied:

@@ -31,6 +31,7 @@ class PlacedRequest:
     Attributes:
         request: The request; None until it is made.
         rcs: Role → name of the chosen RCs; empty until they are chosen.
+        waits_since_s: Mission time of its place in line, see ``CurrentRequest``.
         sending: Task that sends changed run times; cancelled by the next change.
     """
 
@@ -54,6 +55,7 @@ class PlacedRequest:
         """
         self.request: SchedulingRequest | None = None
         self.rcs: dict[str, str] = {}
+        self.waits_since_s = clock.now_s()
         self.sending: asyncio.Task[None] | None = None
         self._sets: list[dict[str, str]] = []
         self._bus, self._clock, self._arc, self._changed, self._note = bus, clock, arc, changed, note
@@ -132,10 +134,18 @@ class PlacedRequest:
         """
         if self.request is None:
             raise UnknownRequest(f"{self._arc} has no request yet")
-        return CurrentRequest(self.request, list(self.rcs.values()), dict(epochs), granted_s)
+        return CurrentRequest(self.request, list(self.rcs.values()), dict(epochs), granted_s, self.waits_since_s)
+
+    def slice_ended(self, granted_s: float) -> None:
+        """Take the last place in line, unless the slice that was granted then ended early."""
+        now_s = self._clock.now_s()
+        if self.request is not None and now_s >= granted_s + self.request.minimum_runtime_s:
+            self.waits_since_s = now_s
 
     async def set_idle(self, idle: bool) -> None:
         """Stop or resume the request for run time; see ``_change``."""
+        if self.request is not None and self.request.idle and not idle:
+            self.waits_since_s = self._clock.now_s()
         await self._change(SetIdle(self._arc, idle), idle=idle)
 
     async def set_run_times(self, least_s: float, most_s: float) -> None:

@@ -156,12 +156,14 @@ class CurrentRequest(Message, frozen=True):
         rcs: The set chosen for it; empty if none was chosen yet.
         epochs: RC → epoch of each hold; empty if the gate is closed.
         granted_s: Mission time of the grant; negative if the gate is closed.
+        waits_since_s: Mission time of its place in line: of its request, or of the end of its last whole slice.
     """
 
     request: SchedulingRequest
     rcs: Annotated[list[Mention], FEW]
     epochs: Annotated[dict[Mention, Epoch], FEW]
     granted_s: Instant
+    waits_since_s: Instant = 0.0
 
 
 # ---------------------------------------------------------------------- to RCs

@@ -67,6 +67,11 @@ class Found:
         believing = [arc for arc, current in self.arcs.items() if current.epochs and not self.holds_rightly(arc)]
         return [*dict.fromkeys([*held, *believing])]
 
+    def waiting(self) -> list[CurrentRequest]:
+        """Return the requests of the ARCs without confirmed holds, in the order of their places in line."""
+        requests = [current for arc, current in self.arcs.items() if not self.holds_rightly(arc)]
+        return sorted(requests, key=lambda current: current.waits_since_s)
+
     def without(self, rcs: Collection[str]) -> Found:
         """Return the findings without these RCs."""
         return Found({rc: state for rc, state in self.rcs.items() if rc not in rcs}, self.arcs)
@@ -86,14 +91,14 @@ class Found:
 def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
     """Return the event that introduces an RC.
 
+    Its capacity is the larger of the declared and the reported one, because its holders may have been connected before
+    it was lowered. The caller reports the present capacity after these.
+
     Args:
         resource: Its declaration in the mission file.
         state: The RC's report; None: it is not up.
     """
     return RcKnown(
-    Its capacity is the larger of the declared and the reported one, because its holders may have been connected before
-    it was lowered. The caller reports the present capacity after these.
-
         rc=resource.name,
         kind=resource.type,
         sharable=resource.sharable,

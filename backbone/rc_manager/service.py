@@ -288,9 +288,8 @@ class RcManager(Component[RcManagerParameters]):
         for _, event in adopted:
             if event.request.idle:  # it sent that while no RC manager answered
                 self.happened(Idled(event.request.arc))
-        for arc, current in found.arcs.items():
-            if not found.holds_rightly(arc):
-                self.admit_again(current)
+        for current in found.waiting():
+            self.admit_again(current)
         for state in found.rcs.values():
             self._heard_of_packets(state)
 

@@ -118,6 +118,7 @@ class PlainArc(Component[Any]):
         self.granted_s = -1.0
         self.request: SchedulingRequest | None = None
         self.rcs: list[str] = []
+        self.waits_since_s = 0.0
         self.log: list[tuple[str, str, float]] = []
         self.beats = True
         self.hangs = False
@@ -130,7 +131,7 @@ class PlainArc(Component[Any]):
             await self.clock.sleep_s(BEAT_WITHIN_S)
 
     async def ask_for(self, request: SchedulingRequest) -> Scheduled:
-        self.request = request
+        self.request, self.waits_since_s = request, self.clock.now_s()
         scheduled = await self.bus.ask(RC_MANAGER, request, Scheduled, within_s=30)
         self.rcs = scheduled.rcs
         return scheduled
@@ -148,12 +149,13 @@ class PlainArc(Component[Any]):
                 return GateOpens()
             case CloseGate(reason=reason, by=by):
                 self.epochs, self.granted_s = {}, -1.0
+                self.waits_since_s = self.clock.now_s() if reason == "slice" else self.waits_since_s
                 self.log.append((reason, by, self.clock.now_s()))
                 return GateClosed()
             case AskRequest():
                 if self.request is None:
                     raise UnknownRequest(f"{self.name} asked for nothing yet")
-                return CurrentRequest(self.request, self.rcs, self.epochs, self.granted_s)
+                return CurrentRequest(self.request, self.rcs, self.epochs, self.granted_s, self.waits_since_s)
         return await super().answer(asked)
 
     @property
@@ -185,9 +187,9 @@ class Pool:
         launch = self.launch(Subsystem.RESOURCE_POOL, resource.name, resource.type)
         rc = PlainRc(launch, self.network.join(launch.address, self.clock), self.clock)
         rc.sharable = resource.sharable
+        rc.loses.update(loses)
         await self.stack.enter_async_context(self.beside(rc))
         self.rcs[resource.name] = rc
-        rc.loses.update(loses)
         return rc
 
     def manager(self) -> RcManager:

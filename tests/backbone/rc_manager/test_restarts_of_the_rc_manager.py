@@ -39,6 +39,22 @@ def test_an_adopted_arc_that_no_longer_fits_is_revoked_at_once(pool: Any) -> Non
     assert check(lines) == []
 
 
+def test_waiting_arcs_keep_their_places_in_line_over_a_restart(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here:
+            arcs = [await here.arc(name) for name in ("first", "second", "third")]
+            async with here.beside(here.manager()):
+                for arc in arcs:
+                    await arc.ask_for(request(arc.name, "left"))
+                await here.clock.sleep_s(6.0)
+                assert arcs[1].is_open
+            async with here.beside(here.manager()):
+                await here.clock.sleep_s(5.0)
+                assert arcs[2].is_open, "the first one had its turn before it"
+
+    run_virtual(main())
+
+
 def test_an_rc_that_dies_again_and_again_leaves_nothing_in_the_rc_manager(pool: Any) -> None:
     """Each death left a hold that had not been ended, for ever."""
 
