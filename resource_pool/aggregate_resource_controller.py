@@ -191,7 +191,7 @@ class AggregateResourceController(Component[ArcParameters]):
             case OpenGate() as order:
                 return await self._open(order)
             case CloseGate() as order:
-                return await self._close(order)
+                return await self._close(order, asked.stamp_s)
             case AskRequest():
                 current = self._placed.current(self.epochs, self._gate.granted_s)
                 self._manager_watch.asks()
@@ -306,7 +306,7 @@ class AggregateResourceController(Component[ArcParameters]):
         if self.parameters.may_say_not_now:
             self._offering = self.start_task(self._slice.offer(noted), "offer more")
 
-    async def _close(self, order: CloseGate) -> GateClosed:
+    async def _close(self, order: CloseGate, ordered_s: float) -> GateClosed:
         closing = self._gate.epochs
         if order.deadline_s > 0 and self._gate.is_open:
             notice = Suspending(self.name, order.reason, order.by, order.deadline_s)
@@ -315,6 +315,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 self.story.note(self._owner, "was not ready when its time to stop cleanly was over")
         if self._gate.epochs == closing:  # the RC manager may not have waited, and have connected the ARC anew
             self._shut(order.reason, order.by, order.expected_s)
+            self._lease.end(closing, ordered_s)
         return GateClosed()
 
     def _shut(self, reason: str, by: str, expected_s: float) -> None:
@@ -326,11 +327,11 @@ class AggregateResourceController(Component[ArcParameters]):
             self._offering = None
         self.report(f"swapped out: {reason}{f' by {by}' if by else ''}")
         if was_open:
+            self._placed.slice_ended(granted_s)
             self._notices.notify(Suspended(self.name, reason, by, expected_s))
 
     def _longest_s(self) -> float:
         return max(self.parameters.minimum_runtime_s, self.parameters.maximum_runtime_s)
-            self._placed.slice_ended(granted_s)
 
     # ------------------------------------------------------------------ commands
     async def _command(self, command: Command) -> Applied:

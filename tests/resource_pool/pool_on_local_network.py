@@ -248,8 +248,8 @@ class Pool:
         parameters = resource.rc_parameters() | changed
         return await self.start(self.rc_classes[resource.type], name, parameters, kind=resource.type)
 
-    async def manager(self) -> RcManager:
-        parameters = {"mission": "local", "mission_priority": 10}
+    async def manager(self, **rules: Any) -> RcManager:
+        parameters = {"mission": "local", "mission_priority": 10} | rules
         return await self.start(RcManager, "rc_manager", parameters, Subsystem.BACKBONE)
 
     async def owner(self, name: str) -> Owner:
