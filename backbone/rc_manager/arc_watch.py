@@ -154,7 +154,7 @@ class ArcWatch:
         """Know the ARC and its requests no longer, and expect no beats; return whether a request was admitted."""
         for choosing in self._requesting.get(arc, ()):
             choosing.request = None
-        self._failures.end(arc)
+        self._failures.forget(arc)
         return self._beats.forget(arc)
 
     def end_silent(self) -> None:

@@ -1,4 +1,12 @@
-"""Failures: RCs and ARCs that run and cannot do their work, since when, and why."""
+"""Failures: RCs and ARCs that run and cannot do their work, since when, and why.
+
+The RC manager acts on each failure at once. What people are told does not change with each packet that a link loses:
+
+* A failure without an answer is told after ``TOLD_AFTER_S``, or at once if it is repeated. One with a reason is told at
+  once.
+* A failure that begins again within ``WORKS_AGAIN_S`` after its end is repeated. It is told as one failure until the RC
+  or ARC has worked for so long.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +16,14 @@ from backbone.bus.interface import Clock
 from backbone.component.messages import Absence
 from backbone.errors import LinkError, Refusal
 
+TOLD_AFTER_S = 1.0  # chosen: the RC was asked three times, so more than one packet was lost
+WORKS_AGAIN_S = 20.0  # chosen: four of the papers' 5 s slices, so an RC that is shared was connected several times
+
 Note = Callable[[str, str], object]
 
 
 class Failures:
-    """The RC manager's one record of failures; each lasts from ``begin`` to ``end``.
+    """The RC manager's one record of failures; each lasts from ``begin`` to ``end``, or longer if it came repeatedly.
 
     Args:
         note: Adds an event to the story of a subject.
@@ -26,33 +37,71 @@ class Failures:
         self.put_aside: dict[str, str] = {}
         self._complaints: dict[str, str] = {}
         self._since_s: dict[str, float] = {}
+        self._ended: dict[str, tuple[float, float]] = {}  # begin and end of the last failure, if not long ago
+        self._repeated: set[str] = set()
+        self._unanswered: set[str] = set()
 
     def complain(self, name: str, what: str, error: Refusal | LinkError) -> None:
         """Add the failure of an RC or ARC to its story, and keep it as its last one."""
         self._note(name, f"{what}: {error}")
+        (self._unanswered.add if isinstance(error, LinkError) else self._unanswered.discard)(name)
         self._complaints[name] = f"{what}: {error.detail if isinstance(error, Refusal) else error}"
 
     def begin(self, name: str) -> None:
         """Count the RC or ARC as failing from now on, unless it already does."""
-        self._since_s.setdefault(name, self._clock.now_s())
+        if name in self._since_s:
+            return
+        self._forget_old()
+        since_s, _ = self._ended.pop(name, (self._clock.now_s(), 0.0))
+        if since_s < self._clock.now_s():
+            self._repeated.add(name)
+        self._since_s[name] = since_s
 
     def end(self, name: str) -> None:
-        """Count the RC or ARC as failing no longer."""
+        """Count the RC or ARC as working."""
+        since_s = self._since_s.pop(name, None)
+        if since_s is not None:
+            self._ended[name] = (since_s, self._clock.now_s())
+
+    def forget(self, name: str) -> None:
+        """Forget the failures of an RC or ARC that does not run."""
         self._since_s.pop(name, None)
+        self._ended.pop(name, None)
+        self._complaints.pop(name, None)
+        self._repeated.discard(name)
+        self._unanswered.discard(name)
+
+    def repeated(self) -> set[str]:
+        """Return the RCs and ARCs that fail repeatedly, also those that work at this moment."""
+        self._forget_old()
+        return {*self._repeated}
 
     def absences(self, needed: Collection[str], doing: str, remedy: str = "") -> list[Absence]:
-        """Return those of these RCs or ARCs that fail, sorted by name.
+        """Return those of these RCs or ARCs that people are told to fail, sorted by name.
 
         Args:
             needed: RCs, or ARCs, whose failure matters now.
             doing: What the RC manager does about it.
             remedy: What an operator can do; ``{name}`` stands for the name.
         """
+        since_s = {name: self._ended[name][0] for name in self.repeated() & self._ended.keys()} | self._since_s
         return [
-            Absence(name, self._since_s[name], self._why(name), doing, remedy.format(name=name), is_running=True)
-            for name in sorted(self._since_s.keys() & needed)
+            Absence(name, since_s[name], self._why(name), doing, remedy.format(name=name), is_running=True)
+            for name in sorted(since_s.keys() & needed)
+            if self._is_told(name, since_s[name])
         ]
+
+    def _is_told(self, name: str, since_s: float) -> bool:
+        may_be_one_packet = name in self._unanswered and name not in self.put_aside and name not in self._repeated
+        return not may_be_one_packet or self._clock.now_s() - since_s >= TOLD_AFTER_S * self._clock.rate
+
+    def _forget_old(self) -> None:
+        long_ago_s = self._clock.now_s() - WORKS_AGAIN_S * self._clock.rate
+        for name in [name for name, (_, ended_s) in self._ended.items() if ended_s <= long_ago_s]:
+            del self._ended[name]
+            self._repeated.discard(name)
 
     def _why(self, name: str) -> str:
         fault = self.put_aside.get(name)
-        return f"it is put aside: {fault}" if fault else self._complaints.get(name, "")
+        why = f"it is put aside: {fault}" if fault else self._complaints.get(name, "")
+        return f"it fails again and again: {why}" if name in self._repeated else why

@@ -101,9 +101,8 @@ class RcWatch:
     def absences(self) -> list[Absence]:
         """Return the RCs that run and cannot be used: put aside, unsafe, silent, or connected in vain."""
         used = {lease.rc for lease in self._service.manager.leases()}
-        return self._failures.absences(
-            used | (self.resources.keys() - self.up), "the RC manager tries it again", REMEDY
-        )
+        needed = used | (self.resources.keys() - self.up) | (self.resources.keys() & self._failures.repeated())
+        return self._failures.absences(needed, "the RC manager tries it again", REMEDY)
 
     def missing(self) -> list[str]:
         """Return the RCs that do not run, sorted."""
@@ -188,7 +187,7 @@ class RcWatch:
         was_known = rc in self.up or bool(self._failures.put_aside.pop(rc, ""))
         self.up.discard(rc)
         self._pauses_s.pop(rc, None)  # its next process may be sound
-        self._failures.end(rc)
+        self._failures.forget(rc)
         return was_known
 
     def does_not_answer(self, rc: str) -> None:
@@ -291,9 +290,9 @@ class RcWatch:
         self.up.discard(rc)
         before = self._failures.put_aside.get(rc)
         if before != fault:
+            self._failures.put_aside[rc] = fault
             self._service.happened(RcWentDown(rc, fault))
         if before is None:  # each answer may have another number in it
-            self._failures.put_aside[rc] = fault
             log.warning("%s is put aside: %s", rc, fault)
             self._service.publish_event(rc, f"is put aside: {fault}", LogLevel.WARNING)
         self.meet_in_a_while(rc)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from rc_manager_at_work import HARDWARE, request
 
 from backbone.addresses import PLACER, RC_MANAGER
@@ -12,7 +13,8 @@ from backbone.component.messages import Absence, AskState, ComponentState
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.placer.messages import Start, Started
-from backbone.rc_manager.messages import AskRc, RcState
+from backbone.rc_manager.failures import WORKS_AGAIN_S
+from backbone.rc_manager.messages import AskRc, Connect, Disconnect, RcState
 from backbone.rc_manager.rc_watch import MEET_LATEST_S
 from backbone.scheduling.requests import LEASE_S
 from backbone.wire import Envelope, Message
@@ -111,6 +113,55 @@ def test_an_arc_that_the_radio_could_not_serve_even_alone_is_named(pool: Any) ->
             absence = (await _absent(fast))["fast"]
             assert absence.cause == "radio could not serve it even alone"
             assert absence.doing == "waits until the capacity of radio grows"
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("lost", [Connect, Disconnect, AskRc])
+def test_one_lost_packet_is_not_told(pool: Any, lost: type[Message]) -> None:
+    """The RC manager acts on it at once; health was degraded for half a second."""
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            one, two = await here.arc("one"), await here.arc("two")
+            await one.ask_for(request("one", "left"))
+            await two.ask_for(request("two", "left"))
+            if lost is AskRc:
+                here.rcs["left"].end("it is killed")
+                await here.clock.sleep_s(0.1)
+                await here.rc(HARDWARE[0], loses=[AskRc])
+            else:
+                here.rcs["left"].loses[lost] = 1
+            for _ in range(80):
+                await here.clock.sleep_s(0.1)
+                assert not await _absent(one)
+            assert one.is_open or two.is_open
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("is_broken", [True, False])
+def test_an_rc_that_fails_again_and_again_is_told_once(pool: Any, is_broken: bool) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            one, two = await here.arc("one"), await here.arc("two")
+            await one.ask_for(request("one", "left"))
+            await two.ask_for(request("two", "left"))
+            told: list[Absence | None] = []
+            for tenth in range(800):
+                if tenth % 100 == 20 and tenth < 400:  # a connection in each second slice
+                    here.rcs["left"].is_broken = is_broken
+                    if not is_broken:
+                        here.rcs["left"].loses[Connect] = 1
+                if tenth % 100 == 80:
+                    here.rcs["left"].is_broken = False
+                absence = (await _absent(one)).get("left")
+                if (told[-1] if told else None) != absence:
+                    told.append(absence)
+                await here.clock.sleep_s(0.1)
+            assert told[-1] is None, f"it has worked for {WORKS_AGAIN_S} s"
+            assert len([absence for absence in told if absence is None]) <= 2
+            assert any(absence is not None and "again and again" in absence.cause for absence in told)
 
     run_virtual(main())
 
