@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
-from backbone.scheduling.entries import OpenDecision
+from backbone.scheduling.entries import ArcEntry, OpenDecision
 from backbone.scheduling.events import RenewLeases
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.preemption import overloading
@@ -49,19 +49,37 @@ class PriorityEvents:
         self._change(moved=lambda place: carried(place, old, new))
 
     def age(self) -> None:
-        """Raise ARCs that wait long, if the rules demand aging; they keep their level until they are served or idle."""
+        """Raise ARCs that wait long, if the rules demand aging; they keep their level until they are served or idle.
+
+        An ARC that its own parent keeps waiting does not rise, because its parent would rise with it.
+        """
+        rising = self._rising()
         for arc in self._state.arcs.values():
-            if arc.state is RequestState.WAITING:
+            if arc in rising:
                 self._state.raise_to(arc, int((self._decision.now_s - arc.since_s) / self._aging_s + ROUNDING))
-            elif arc.served(self._decision.now_s) or not arc.active:
+            elif arc.served(self._decision.now_s) or not arc.active or arc.state is RequestState.WAITING:
                 self._state.raise_to(arc, 0)
         if self._tree.age((arc.place_in_tree, arc.raised) for arc in self._state.arcs.values() if arc.raised):
             self._change()
 
     def next_aging_s(self) -> float | None:
         """Return when the next ARC rises; None if no ARC will."""
-        waiting = [arc for arc in self._state.arcs.values() if arc.state is RequestState.WAITING]
-        return min((arc.since_s + (arc.raised + 1) * self._aging_s for arc in waiting), default=None)
+        return min((arc.since_s + (arc.raised + 1) * self._aging_s for arc in self._rising()), default=None)
+
+    def _rising(self) -> dict[ArcEntry, None]:
+        """Return the waiting ARCs that no active ARC of an ancestor in the tree keeps waiting."""
+        arcs = self._state.arcs.values()
+        active: dict[Place, list[ArcEntry]] = {}
+        for arc in arcs:
+            if arc.active:
+                active.setdefault(arc.place_in_tree, []).append(arc)
+        return {arc: None for arc in arcs if arc.state is RequestState.WAITING and not self._has_rival(arc, active)}
+
+    def _has_rival(self, arc: ArcEntry, active: Mapping[Place, Sequence[ArcEntry]]) -> bool:
+        """Return whether the ARC cannot run beside one of these that is above it in the tree."""
+        place = arc.place_in_tree
+        above = [other for depth in range(1, len(place)) for other in active.get(place[:depth], ())]
+        return any(not self._table.fits(arc, [other]) for other in above)
 
     def _change(self, change: Callable[[], None] | None = None, moved: Callable[[Place], Place] | None = None) -> None:
         """Change the tree, move ARCs, and apply the numbers of the tree from now on."""

@@ -298,7 +298,9 @@ class Explanation:
     def _starves(self, arc: ArcEntry, blockers: Sequence[ArcEntry], what: str) -> _Answer:
         lasting = (RequestState.CONNECTING, RequestState.RUNNING)
         stay = [other for other in blockers if other.state in lasting and higher(other.path, arc.path)]
-        risen = f", unless {arc.name} rises meanwhile (aging)" if self._rules.aging_s else ""
+        place = arc.place_in_tree
+        rises = self._rules.aging_s and not any(place[: len(o.place_in_tree)] == o.place_in_tree for o in stay)
+        risen = f", unless {arc.name} rises meanwhile (aging)" if rises else ""
         if not stay:
             remedy = f"{_release(blockers)}, or a shorter minimum run time"
             return _Answer([f"{what}: no gap is long enough for it{risen}"], "9", remedy)

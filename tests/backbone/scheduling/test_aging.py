@@ -63,3 +63,37 @@ def test_a_branch_comes_down_when_its_arc_that_rose_wants_no_time_any_more():
     assert bench.runs("sibling") == [(30.0, 31.0)]
     assert bench.runs("middle") == [(31.0, None)]
     assert bench.verdict() == []
+
+
+def test_an_arc_that_waits_for_its_own_parent_starves_nobody_else():
+    """It never gets higher than its parent, but raised it, for ever: the parent kept its RC from all others."""
+    bench = Bench(manager(aging_s=1.0), unit("v"))
+    bench.tell(ask("parent", "v", path=[("watch", 0), ("parent", 1)]))
+    bench.tell(ask("child", "v", path=[("watch", 0), ("parent", 1), ("child", 1)]))
+    bench.tell(ask("other", "v", path=[("watch", 0), ("other", 1)]))
+    bench.run(60.0)
+    assert len(bench.runs("other")) >= 5
+    assert len(bench.runs("parent")) >= 5
+    child = next(one for one in bench.answers.schedule(60.0).requests if one.arc == "child")
+    assert "aging" not in child.because
+    assert bench.verdict() == []
+
+
+def test_an_arc_that_waited_for_its_own_parent_has_risen_when_the_parent_ends():
+    bench = Bench(manager(aging_s=10.0), unit("v"))
+    bench.tell(ask("parent", "v", path=[("watch", 0), ("parent", 1)]))
+    bench.tell(ask("child", "v", path=[("watch", 0), ("parent", 1), ("child", 1)]))
+    bench.at(12.0, ask("high", "v", priority=2))
+    bench.at(20.0, Departed("parent"))
+    bench.run(60.0)
+    assert bench.runs("child")[0][0] <= 25.0
+    assert bench.verdict() == []
+
+
+def test_an_arc_that_fits_beside_its_parent_rises():
+    bench = Bench(manager(aging_s=2.0), unit("v"), unit("w"))
+    bench.tell(ask("parent", "w", path=[("watch", 0), ("parent", 1)]))
+    bench.tell(ask("high", "v", priority=3))
+    bench.tell(ask("child", "v", path=[("watch", 0), ("parent", 1), ("child", 1)]))
+    bench.run(30.0)
+    assert bench.runs("child")
