@@ -53,13 +53,18 @@ class Found:
         )
 
     def orphans(self) -> list[tuple[str, str, int]]:
-        """Return RC, ARC and epoch of each hold without a matching belief of its ARC."""
-        return [
-            (rc.name, holder.arc, holder.epoch)
-            for rc in self.rcs.values()
-            for holder in rc.holders
-            if not self.holds_rightly(holder.arc)
+        """Return RC, ARC and epoch of each hold without its ARC's belief, and of each belief without its hold.
+
+        The RC of such a belief may be the successor of a killed one, and must confirm for it (decision 0006).
+        """
+        holds = [(rc.name, holder.arc, holder.epoch) for rc in self.rcs.values() for holder in rc.holders]
+        beliefs = [
+            (rc, arc, epoch)
+            for arc, current in self.arcs.items()
+            for rc, epoch in current.epochs.items()
+            if rc in self.rcs and epoch <= self.rcs[rc].last_epoch
         ]
+        return [hold for hold in dict.fromkeys([*holds, *beliefs]) if not self.holds_rightly(hold[1])]
 
     def strays(self) -> list[str]:
         """Return the ARCs whose gates may be open, or about to open, although their holds are not all confirmed."""

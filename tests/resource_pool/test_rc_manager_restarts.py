@@ -17,6 +17,7 @@ from backbone.wire import Envelope, Message
 from resource_pool.arcs.drive import DriveArc
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.holds import Hold
+from resource_pool.messages import COMMAND_TIMEOUT_S
 from resource_pool.rcs.skeleton import Lamp
 
 PAINTED = "resource_pool.rcs.skeleton:PaintedLamp"
@@ -152,5 +153,27 @@ def test_a_wish_while_the_first_request_finds_no_rc_manager_counts_at_the_next_o
             await pool.manager()
             await pool.clock.sleep_s(1.0)
             assert owner.heard()[-1:] != ["Resumed"]
+
+    run_virtual(main())
+
+
+def test_a_radio_killed_with_the_rc_manager_confirms_before_its_robots_frequency_is_free(local_mission: Any) -> None:
+    """The robot drives and transmits until its own watchdog stops it."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "scout2", "radio", "video"]) as pool:
+            await (await pool.arc(await pool.owner("owner"), "video_drive", "scout1")).wait_granted()
+            _, preferred = await pool.console("console", "video_drive", "scout2", idle=True)
+            for name in ("rc_manager", "radio"):
+                await pool.kill(name)
+            killed_s = pool.clock.now_s()
+            await pool.rc("radio")
+            with pytest.raises(Refusal, match="no answer"):
+                await preferred.idle(False)
+            await pool.manager()
+            await pool.clock.sleep_s(2.0)
+            assert (await preferred.state()).granted
+            (holder,) = (await state_of(pool, "video")).holders
+            assert holder.since_s >= killed_s + COMMAND_TIMEOUT_S
 
     run_virtual(main())
