@@ -51,6 +51,7 @@ from backbone.scheduling.requests import (
 )
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import HardwareFault
+from resource_pool.messages import SwappedOut
 
 HARDWARE = [
     Resource("left", "scout"),
@@ -115,6 +116,7 @@ class PlainArc(Component[Any]):
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
         self.epochs: dict[str, int] = {}
+        self.opening: dict[str, int] = {}
         self.granted_s = -1.0
         self.request: SchedulingRequest | None = None
         self.rcs: list[str] = []
@@ -143,12 +145,15 @@ class PlainArc(Component[Any]):
             case OpenGate() if self.cannot_open is not None:
                 raise self.cannot_open
             case OpenGate(epochs=epochs, settled_s=settled_s):
+                self.opening = epochs
                 await self.clock.sleep_until_s(settled_s)
+                if self.opening is not epochs:
+                    raise SwappedOut(f"{self.name} was closed while it prepared")
                 self.epochs, self.granted_s = epochs, self.clock.now_s()
                 self.log.append(("open", "", self.clock.now_s()))
                 return GateOpens()
             case CloseGate(reason=reason, by=by):
-                self.epochs, self.granted_s = {}, -1.0
+                self.epochs, self.granted_s, self.opening = {}, -1.0, {}
                 self.waits_since_s = self.clock.now_s() if reason == "slice" else self.waits_since_s
                 self.log.append((reason, by, self.clock.now_s()))
                 return GateClosed()
