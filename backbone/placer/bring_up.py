@@ -100,7 +100,7 @@ class BringUp:
         """Return when no silent host can run the component any more, or when the component and its host are back."""
         name = record.spawn.name
         while record.phase is PlacementPhase.STARTING and not record.unwanted:
-            until_s = self._book.fenced_until_s(name, self._clock.now_s())
+            until_s = self._book.fences.until_s(name, self._clock.now_s())
             if until_s is None:
                 return
             record.doing = "waits until the silent host has ended it"

@@ -133,12 +133,12 @@ class Creators:
             CreatorSilent: The creator lives but does not answer; the outcome is unknown.
         """
         by = await self.end(host, name, reason) if host else EndedBy.ITSELF
-        silent = ""
-        while (until_s := self._book.fenced_until_s(name, self._clock.now_s())) is not None:
-            silent = self._book.silent_host(name)
+        silent: frozenset[str] = frozenset()
+        while (until_s := self._book.fences.until_s(name, self._clock.now_s())) is not None:
+            silent = self._book.fences.hosts(name)
             await self._news.or_at(until_s)
-        if self._book.is_alive(silent):  # it was only cut off
-            by = await self.end(silent, name, reason)
+        for one in filter(self._book.is_alive, sorted(silent)):  # it was only cut off
+            by = await self.end(one, name, reason)
         return by
 
     async def fate_of_spawn(self, record: PlacementRecord) -> tuple[Fate, int]:

@@ -37,6 +37,7 @@ class Meetings:
         news: News,
         *,
         own_host: str,
+        remember: Callable[[str], None],
         note: Callable[[str, str], object],
         carry_out: Callable[[list[Instruction]], None],
         begin: Callable[[Work, str], None],
@@ -51,13 +52,15 @@ class Meetings:
             creators: Lists the creators and their processes.
             news: Gets the end of each meeting.
             own_host: Host of the placer: a creator there is never cut off.
+            remember: Saves the name of another host that has a creator for the next placer.
             note: Subject, event → the story.
             carry_out: Carries out the book's instructions.
             begin: Starts a task with a name.
             begin_later: Starts a task with a name, once the placer serves.
         """
         self._bus, self._clock, self._book, self._creators, self._news = bus, clock, book, creators, news
-        self._own_host, self._note, self._carry_out = own_host, note, carry_out
+        self._own_host, self._remember = own_host, remember
+        self._note, self._carry_out = note, carry_out
         self._begin, self._begin_later = begin, begin_later
         self._meeting: dict[str, int] = {}
         self._newest: dict[str, int] = {}
@@ -155,6 +158,8 @@ class Meetings:
             if not self._meeting[host]:
                 del self._meeting[host]
             self._news.tell()
+        if host != self._own_host:
+            self._remember(host)
         if self._newest[host] == creator.pid:  # else the placer meets its successor instead
             self._carry_out(self._book.creator_up(host, answered.tags, creator.pid, answered.processes, asked_s))
 

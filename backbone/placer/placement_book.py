@@ -13,8 +13,7 @@ Rules:
   owners claim new ones.
 * When a creator dies, its components die with it. Pinned components wait until their creator is back.
 * The book remembers each order to stop, so that owners do not start the component again when they find it missing.
-* A silent host may only be cut off and run on for a while. Its components are *fenced*: they are started elsewhere only
-  when that host has ended them by itself, or when its creator is back and has listed its processes.
+* A silent host may only be cut off and run on for a while. Its components are *fenced*: see ``fences``.
 * A host that was cut off may return with components that were stopped meanwhile. The placer ends these orphans.
 
 If a creator dies before it answers a start, the start stays in the book: the component goes to another host or waits
@@ -33,6 +32,7 @@ from backbone.component_database.messages import ComponentType, Multiplicity, Mu
 from backbone.creator.messages import HostLoad, ProcessState, Spawn
 from backbone.naming import Subsystem, did_you_mean
 from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase, PlacementRecord
+from backbone.placer.fences import Fences
 from backbone.placer.messages import NotPlaced
 from backbone.placer.packing import is_packed, joined, whole
 from backbone.placer.placement import CandidateHost, Choice, obstacle, place
@@ -64,7 +64,7 @@ class PlacementBook:
         self._numbers: dict[str, int] = {}
         self._left_behind: set[tuple[str, str]] = set()
         self._stopped: dict[str, str] = {}
-        self._fences: dict[str, tuple[str, float]] = {}
+        self.fences = Fences(self.is_alive)
         self._failed_s: dict[tuple[str, str], float] = {}
 
     # ------------------------------------------------------------------ views
@@ -109,18 +109,6 @@ class PlacementBook:
         record = self.record(name)
         revived = [replace(view, alive=True) for view in self.hosts()]
         return not revived or any(not obstacle(view, record.spawn.tags, record.pin) for view in revived)
-
-    def fenced_until_s(self, name: str, now_s: float) -> float | None:
-        """Return the time until which a silent host may still run this component; None: no host may."""
-        host, until_s = self._fences.get(name, ("", 0.0))
-        if host and until_s > now_s and not self.is_alive(host):
-            return until_s
-        self._fences.pop(name, None)
-        return None
-
-    def silent_host(self, name: str) -> str:
-        """Return the host on which this component is fenced; empty: none."""
-        return self._fences.get(name, ("", 0.0))[0]
 
     def stopped(self) -> dict[str, str]:
         """Return the names that were ordered to stop and were not started since, with the reason."""
@@ -190,6 +178,7 @@ class PlacementBook:
                 pid=taken.pid,
             )
         self._remember_number(spawn)
+        self.fences.name_entered(spawn.name)
         self._stopped.pop(spawn.name, None)
         record = self._records[spawn.name] = PlacementRecord(spawn, pin, PlacementPhase.STARTING, "", now_s)
         return record
@@ -286,7 +275,7 @@ class PlacementBook:
             name = record.spawn.name
             self._left_behind.add((host, name))
             if fence_s > 0:
-                self._fences[name] = (host, now_s + fence_s)
+                self.fences.host_lost(name, host, now_s + fence_s)
             if record.phase is PlacementPhase.STARTING:
                 continue  # the task that starts it detects the loss and decides
             if record.phase is PlacementPhase.RUNNING and record.spawn.policy.restart and not record.unwanted:

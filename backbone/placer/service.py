@@ -22,10 +22,10 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, LogLevel
 from backbone.component_database.messages import Admit, Admitted, ComponentType, Multiplicity
+from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S, RestartPolicy, Spawn
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.creator.messages import RestartPolicy, Spawn
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
@@ -33,6 +33,7 @@ from backbone.naming import legal
 from backbone.placer.bring_up import BringUp
 from backbone.placer.creators import ANSWER_EACH_S, ANSWER_WITHIN_S, SPAWN_WITHIN_S, Creators, creator_of
 from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase, PlacementRecord
+from backbone.placer.hosts_file import HostsFile
 from backbone.placer.meetings import Meetings, Work
 from backbone.placer.messages import (
     AskPlacement,
@@ -80,6 +81,7 @@ class Placer(Component[PlacerParameters]):
         super().__init__(launch, bus, clock)
         self._book = PlacementBook(self.parameters.packs or 0)
         self._queue: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
+        self._hosts_file = HostsFile(launch.run_directory)
         self._happened = News(clock)
         self._creators = Creators(bus, clock, self._book, self._happened)
         self._meetings = Meetings(
@@ -89,6 +91,7 @@ class Placer(Component[PlacerParameters]):
             self._creators,
             self._happened,
             own_host=launch.host,
+            remember=self._remember_host,
             note=self.story.note,
             carry_out=self._carry_out,
             begin=self._begin,
@@ -110,6 +113,8 @@ class Placer(Component[PlacerParameters]):
     async def connect(self) -> None:
         """Recovery: collect the processes of all creators before the first question can arrive."""
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._component_changed)
+        fenced_until_s = self.clock.now_s() + CUT_OFF_ENDS_WITHIN_S * self.clock.rate
+        self._book.fences.after_restart(self._hosts_file.read(), fenced_until_s)
         found = await self._creators.listed()
         await asyncio.gather(*(self._meetings.meet(creator) for creator in found.components))
         self.bus.watch_alive(NAMESERVER, self._nameserver_changed)
@@ -287,6 +292,14 @@ class Placer(Component[PlacerParameters]):
         """Compare again, because messages were lost while the link or the hub was down."""
         if alive:
             self._begin_later(self._meetings.look_again, "look again")
+
+    def _remember_host(self, host: str) -> None:
+        """Save the name of another host for the next placer; a write error ends no placer."""
+        try:
+            self._hosts_file.keep(host)
+        except OSError as error:
+            lost = f"a restart of the placer will not know that {host} may be cut off: {error.strerror}"
+            self.publish_event(self.name, lost, LogLevel.WARNING)
 
     def _enqueue(self, begin: Callable[[], None]) -> None:
         """Queue this call for ``serve``, because events arrive before the component serves."""

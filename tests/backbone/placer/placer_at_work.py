@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+import tempfile
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
 
@@ -41,7 +42,7 @@ from backbone.creator.messages import (
 )
 from backbone.keys import Conversation
 from backbone.nameserver.service import Nameserver
-from backbone.naming import Subsystem
+from backbone.naming import Subsystem, claim_address
 from backbone.placer.messages import (
     Ended,
     ListPlacements,
@@ -133,7 +134,8 @@ class FakeCreator(Component[NoParameters]):
 class Mission:
     """Core services and creators on one network, each of which can be killed and begun again."""
 
-    def __init__(self) -> None:
+    def __init__(self, run_directory: str) -> None:
+        self._run_directory = run_directory
         self.network = LocalNetwork()
         self.clock = VirtualClock()
         self.bus = self.network.join("backbone/boss", self.clock)
@@ -144,6 +146,8 @@ class Mission:
         type_name = "creator" if kind is FakeCreator else name
         parameters = more.pop("parameters", {})
         launch = Launch("local", Subsystem.BACKBONE, name, type_name, "x:Y", host, "", 0.0, 1.0, parameters)
+        if kind is Placer:
+            launch = msgspec.structs.replace(launch, run_directory=self._run_directory)
         component = kind(launch, self.network.join(launch.address, self.clock), self.clock, **more)
         self._lives[name] = (component, asyncio.create_task(component.run(), name=f"life of {name}"))
         await self.clock.sleep_s(0.01)
@@ -166,14 +170,21 @@ class Mission:
         await self.kill(name)
 
     def cut_off(self, host: str) -> None:
-        """Let the creator's token fall, as a cut link does; the creator and what it runs live on."""
-        for token in list(self.network.tokens[f"backbone/creator-{host}"]):
-            token.close()
+        """Let the host's tokens fall, as a cut link does; the creator and what it runs live on."""
+        for _, address in self._tokens_on(host):
+            for token in list(self.network.tokens.get(address, ())):
+                token.close()
 
     def reconnect(self, host: str) -> None:
-        """Let the token rise again."""
+        """Let the tokens rise again."""
+        for component, address in self._tokens_on(host):
+            component.bus.declare_alive(address)
+
+    def _tokens_on(self, host: str) -> Iterator[tuple[Component[NoParameters], str]]:
         creator = self.creators[host]
-        creator.bus.declare_alive(creator.address)
+        for component in (creator, *(child for _, child, _ in creator.lives.values())):
+            yield component, component.address
+            yield component, claim_address(component.address, host, component.pid)
 
     async def kill_all(self) -> None:
         for name in ["placer", *[f"creator-{host}" for host in self.creators], "component_database", "nameserver"]:
@@ -200,8 +211,8 @@ class Mission:
 
 @asynccontextmanager
 async def mission(*hosts: str) -> AsyncIterator[Mission]:
-    one = Mission()
     async with AsyncExitStack() as ends:
+        one = Mission(ends.enter_context(tempfile.TemporaryDirectory(prefix="s-")))
         ends.push_async_callback(one.kill_all)
         await one.begin(Nameserver, "nameserver")
         types = [msgspec.to_builtins(component_type) for component_type in TYPES]

@@ -70,6 +70,56 @@ async def test_what_a_silent_host_may_still_run_is_started_elsewhere_only_when_i
 
 
 @on("a", "b")
+async def test_a_restarted_placer_starts_nothing_that_a_silent_host_may_still_run(one: Mission) -> None:
+    """The placer ends after the link of a host is cut, and before that host has ended what it runs."""
+    await one.start("watcher", "w1")
+    await one.start("watcher", "w2")
+    assert await one.placements() == {"w1": "a", "w2": "b"}
+    one.cut_off("b")
+    await one.clock.sleep_s(1.0)
+    await one.kill("placer")
+    await one.begin(Placer, "placer")
+    starting = asyncio.create_task(one.start("watcher", "w2"))
+    await one.clock.sleep_s(CUT_OFF_ENDS_WITHIN_S - 1.0)
+    assert one.creators["a"].spawns == ["w1"]
+    await one.creators["b"].kill_child("w2")
+    assert (await starting).host == "a"
+
+
+@on("a", "b")
+async def test_a_host_that_returns_to_a_restarted_placer_keeps_what_it_runs(one: Mission) -> None:
+    await one.start("watcher", "w1")
+    await one.start("watcher", "w2")
+    one.cut_off("b")
+    await one.kill("placer")
+    await one.begin(Placer, "placer")
+    starting = asyncio.create_task(one.start("watcher", "w2"))
+    await one.clock.sleep_s(2.0)
+    one.reconnect("b")
+    assert (await starting).host == "b"
+    began_s = one.clock.now_s()
+    assert (await one.start("watcher", "w3")).host in ("a", "b")
+    assert one.clock.now_s() - began_s < 1.0, "all hosts are back: a start waits for none"
+    assert sorted(one.creators["a"].spawns + one.creators["b"].spawns) == ["w1", "w2", "w3"]
+
+
+@on("a", "b")
+async def test_hub_and_placer_that_fall_together_start_nothing_twice(one: Mission) -> None:
+    await one.start("watcher", "w1")
+    await one.start("watcher", "w2")
+    for name in ("nameserver", "placer"):
+        await one.kill(name)
+    one.cut_off("b")
+    await one.begin(Nameserver, "nameserver")
+    await one.begin(Placer, "placer")
+    starting = asyncio.create_task(one.start("watcher", "w2"))
+    await one.clock.sleep_s(0.8)
+    one.reconnect("b")
+    assert (await starting).host == "b"
+    assert one.creators["a"].spawns == ["w1"]
+
+
+@on("a", "b")
 async def test_a_stop_is_confirmed_only_when_a_silent_host_cannot_run_it_any_more(one: Mission) -> None:
     await one.start("watcher", "w", host="b")
     one.cut_off("b")
