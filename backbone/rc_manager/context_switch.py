@@ -213,7 +213,9 @@ class ContextSwitch:
         rc, arc, epoch = hold
         has_complained = False
         while (left_s := self._real_s(lease_until_s)) > 0:
-            within_s = min(RC_REPLY_S, left_s, max(CONFIRM_S, self._real_s(free_by_s)))
+            may_leave = self._may_leave(rc, arc)  # else only an answer, or the lease, makes it free
+            wait_s = max(CONFIRM_S, self._real_s(free_by_s)) if may_leave else RC_REPLY_S
+            within_s = min(RC_REPLY_S, left_s, wait_s)
             try:
                 await self._bus.ask(in_pool(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=within_s)
                 return True

@@ -74,6 +74,7 @@ class PlainRc(Component[Any]):
         self.log: list[tuple[str, str]] = []
         self.hangs = self.does_not_obey = self.is_broken = False
         self.loses: Counter[type[Message]] = Counter()
+        self.confirms_after_s = 0.0
         self.tells: Callable[[RcState], RcState] = lambda state: state
 
     async def answer(self, asked: Envelope[Any]) -> Message:
@@ -99,6 +100,7 @@ class PlainRc(Component[Any]):
             case Disconnect(arc=arc):
                 self.holders.pop(arc, None)
                 self.log.append(("disconnect", arc))
+                await self.clock.sleep_s(self.confirms_after_s)
                 return Disconnected(self.last_epoch)
             case AskRc():
                 holders = [Holder(arc, epoch, 0.0, 0.0) for arc, epoch in self.holders.items()]

@@ -57,3 +57,22 @@ def test_nor_do_they_wait_for_one_that_hangs_after_it_was_connected(pool: Any) -
             return here.trace  # type: ignore[no-any-return]
 
     assert check([json.loads(line) for line in run_virtual(main()).read_text().splitlines()]) == []
+
+
+def test_a_shared_rc_on_a_slow_link_is_free_when_it_confirms_and_not_only_after_its_lease(pool: Any) -> None:
+    """Its first answer comes after the grace, and another ARC holds it, too, so the switch waits for it."""
+
+    async def main() -> float:
+        async with pool() as here, here.beside(here.manager()):
+            other, behavior, console = [await here.arc(name) for name in ("other", "behavior", "console")]
+            await other.ask_for(request("other", "radio", minimum_runtime_s=60.0))
+            await behavior.ask_for(request("behavior", "left", "radio", minimum_runtime_s=60.0))
+            await here.clock.sleep_s(1.0)
+            here.rcs["radio"].confirms_after_s = 0.3
+            asked_s: float = here.clock.now_s()
+            await console.ask_for(request("console", "left", priority=100))
+            await here.clock.sleep_s(2 * LEASE_S)
+            assert other.is_open
+            return float(console.granted_s) - asked_s
+
+    assert 0.3 < run_virtual(main()) < 0.5
