@@ -47,6 +47,10 @@ class Failures:
         (self._unanswered.add if isinstance(error, LinkError) else self._unanswered.discard)(name)
         self._complaints[name] = f"{what}: {error.detail if isinstance(error, Refusal) else error}"
 
+    def is_silent(self, name: str) -> bool:
+        """Return whether the last failure of the RC or ARC was a missing answer."""
+        return name in self._unanswered and name not in self.put_aside
+
     def begin(self, name: str) -> None:
         """Count the RC or ARC as failing from now on, unless it already does."""
         if name in self._since_s:
@@ -76,23 +80,25 @@ class Failures:
         self._forget_old()
         return {*self._repeated}
 
-    def absences(self, needed: Collection[str], doing: str, remedy: str = "") -> list[Absence]:
+    def absences(
+        self, needed: Collection[str], doing: str, remedy: Callable[[str], str] = lambda _name: ""
+    ) -> list[Absence]:
         """Return those of these RCs or ARCs that people are told to fail, sorted by name.
 
         Args:
             needed: RCs, or ARCs, whose failure matters now.
             doing: What the RC manager does about it.
-            remedy: What an operator can do; ``{name}`` stands for the name.
+            remedy: Returns what an operator can do about the failure of this name.
         """
         since_s = {name: self._ended[name][0] for name in self.repeated() & self._ended.keys()} | self._since_s
         return [
-            Absence(name, since_s[name], self._why(name), doing, remedy.format(name=name), is_running=True)
+            Absence(name, since_s[name], self._why(name), doing, remedy(name), is_running=True)
             for name in sorted(since_s.keys() & needed)
             if self._is_told(name, since_s[name])
         ]
 
     def _is_told(self, name: str, since_s: float) -> bool:
-        may_be_one_packet = name in self._unanswered and name not in self.put_aside and name not in self._repeated
+        may_be_one_packet = self.is_silent(name) and name not in self._repeated
         return not may_be_one_packet or self._clock.now_s() - since_s >= TOLD_AFTER_S * self._clock.rate
 
     def _forget_old(self) -> None:

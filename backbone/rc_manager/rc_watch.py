@@ -14,6 +14,7 @@ from typing import Protocol
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LogLevel, NameTaken
 from backbone.component.story import StoryBook
 from backbone.dependency_database.messages import Resource
@@ -22,6 +23,7 @@ from backbone.placer.messages import Start, Started
 from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch, Hold, in_pool
 from backbone.rc_manager.credibility import contradiction
 from backbone.rc_manager.failures import Failures
+from backbone.rc_manager.host_links import HostLinks
 from backbone.rc_manager.messages import AskRc, RcState
 from backbone.rc_manager.recovery import Found, Recovery
 from backbone.scheduling.events import CapacityChanged, Event, RcCameBack, RcWentDown
@@ -40,6 +42,7 @@ MEET_LATEST_S = 16.0  # chosen: meanwhile an ARC preempted for a vain connection
 class Service(Protocol):
     """The interface of the RC manager for this watch."""
 
+    launch: Launch
     bus: Bus
     clock: Clock
     story: StoryBook
@@ -83,6 +86,7 @@ class RcWatch:
             recovery: Finds the present components.
         """
         self._service, self._failures = service, failures
+        self._links = HostLinks(service.bus, service.clock, service.launch.host)
         self._context_switch = context_switch
         self._recovery = recovery
         self.resources: dict[str, Resource] = {}
@@ -102,7 +106,11 @@ class RcWatch:
         """Return the RCs that run and cannot be used: put aside, unsafe, silent, or connected in vain."""
         used = {lease.rc for lease in self._service.manager.leases()}
         needed = used | (self.resources.keys() - self.up) | (self.resources.keys() & self._failures.repeated())
-        return self._failures.absences(needed, "the RC manager tries it again", REMEDY)
+        return self._failures.absences(needed, "the RC manager tries it again", self._remedy)
+
+    def _remedy(self, rc: str) -> str:
+        link = self._links.remedy(rc) if self._failures.is_silent(rc) else ""
+        return link or REMEDY.format(name=rc)
 
     def missing(self) -> list[str]:
         """Return the RCs that do not run, sorted."""
@@ -170,6 +178,8 @@ class RcWatch:
         if rc not in self._failing:
             self._failing.add(rc)
             self._service.start_task(self._meet_later(rc, self._pauses_s.get(rc, MEET_AGAIN_S)), f"meet {rc}")
+            if self._failures.is_silent(rc):
+                self._service.start_task(self._measure_link(rc), f"measure the link to {rc}")
 
     def connected(self, rcs: Iterable[str]) -> None:
         """Note that these RCs were connected."""
@@ -256,6 +266,10 @@ class RcWatch:
             self._failing.discard(rc)
             if rc not in self.up:
                 self._failures.end(rc)
+
+    async def _measure_link(self, rc: str) -> None:
+        await self._links.measure(rc)
+        self._service.changed()
 
     async def _ask(self, rc: str, given: int | None = None) -> RcState | None:
         """Return the RC's own report of its state; None if it does not answer, or is not credible and put aside."""

@@ -199,9 +199,10 @@ class Pool:
         self.rcs[resource.name] = rc
         return rc
 
-    def manager(self) -> RcManager:
+    def manager(self, host: str = "here") -> RcManager:
         parameters = {"mission": "local", "mission_priority": 10, "trace": str(self.trace)}
         launch = self.launch(Subsystem.BACKBONE, "rc_manager", "rc_manager", parameters)
+        launch = msgspec.structs.replace(launch, host=host)
         return RcManager(launch, self.network.join(launch.address, self.clock), self.clock)
 
 

@@ -9,7 +9,7 @@ from rc_manager_at_work import HARDWARE, request
 
 from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import run_virtual
-from backbone.component.messages import Absence, AskState, ComponentState
+from backbone.component.messages import Absence, AskState, AskTime, ComponentState, MissionTime
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.placer.messages import Start, Started
@@ -65,6 +65,37 @@ def test_an_rc_that_is_connected_in_vain_is_named_until_it_is_connected(pool: An
             here.rcs["left"].is_broken = False
             await here.clock.sleep_s(MEET_LATEST_S)
             assert not await _absent(holder)
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(
+    ("own_host", "round_trip_s", "remedy"),
+    [
+        ("here", 0.6, "examine its hardware"),
+        ("base", 0.02, "examine its hardware"),
+        ("base", 0.6, "check the link to here: a round trip takes 0.60 s"),
+        ("base", 60.0, "check the link to here: its creator does not answer either"),
+    ],
+)
+def test_the_remedy_for_an_rc_that_does_not_answer_names_a_slow_link(
+    pool: Any, own_host: str, round_trip_s: float, remedy: str
+) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager(own_host)):
+            asker, creator = await here.arc("asker"), here.network.join("backbone/creator-here", here.clock)
+
+            async def answer(_asked: Envelope[AskTime]) -> Message:
+                await here.clock.sleep_s(round_trip_s)
+                return MissionTime(0.0, 1.0, 0.0)
+
+            creator.serve("backbone/creator-here", AskTime, answer)
+            here.rcs["left"].hangs = True
+            here.rcs["left"].changed()
+            await asker.ask_for(request("asker", "left"))
+            await here.clock.sleep_s(5.0)
+            assert remedy in (await _absent(asker))["left"].remedy
+            await creator.close()
 
     run_virtual(main())
 
