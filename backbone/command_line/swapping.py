@@ -10,14 +10,15 @@ from backbone.bus.interface import Bus
 from backbone.command_line.connection import connected
 from backbone.command_line.unit_modules import REPLY_TIME_S, modules_by_unit
 from backbone.command_line.where import Where
-from backbone.component.messages import AskState, ComponentState
+from backbone.component.messages import Absence, AskState, AskTime, ComponentState, MissionTime
+from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, OutcomeUnknown, Refusal
 from backbone.exchange import NotExchanged, Silent, SwapClass, SwapModule, Swapped, UnknownModule
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import Subsystem, component_of, did_you_mean
+from backbone.naming import Subsystem, address, component_of, did_you_mean
 from backbone.placer.messages import ListPlacements, Placements
 from backbone.spoken import counted
 from backbone.wire import UnknownMessage
@@ -48,7 +49,7 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
             say(f"the exchange goes on without this command; 'scout-backbone log --text {asked.module}' shows its end")
             raise
         except LinkError as error:
-            told = f"{component_of(at)} ended or hung while it exchanged {asked.module}: {error}"
+            told = f"{component_of(at)} ended, hung or was cut off while it exchanged {asked.module}: {error}"
             raise OutcomeUnknown(told, remedy=f"See 'scout-backbone why {component_of(at)}', and 'log'.") from error
     counts = "round" if question is asked else "command" if at.startswith(f"{Subsystem.MISSION_CONTROL}/") else "call"
     show([_told(asked, swapped, counts)])
@@ -76,6 +77,7 @@ async def addressed(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
         Silent: The component of this name, or a unit that may run it, does not answer or is not up.
     """
     listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
+    hosts = {one.address: one.host for one in listed.components}
     units = [one.address for one in listed.components if one.type == EXECUTION_UNIT]
     told = await modules_by_unit(bus, units)
     at = {str(one["name"]): unit for unit, modules in told.items() for one in modules or ()}
@@ -84,15 +86,18 @@ async def addressed(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
         return at[asked.module], asked
     others = {component_of(one.address): one.address for one in listed.components if _may_be_exchanged(one)}
     if asked.module in others:
-        address = others[asked.module]
+        part = others[asked.module]
         try:
-            await bus.ask(address, AskState(), ComponentState, within_s=REPLY_TIME_S)
+            await bus.ask(part, AskState(), ComponentState, within_s=REPLY_TIME_S)
         except LinkError as error:
-            raise Silent(f"{asked.module} does not answer: {error}") from None
+            raise await _silent(bus, f"{asked.module} does not answer: {error}", {hosts[part]}) from None
         times = asked.prove_s, asked.ready_within_s
-        return address, SwapClass(asked.class_path, asked.parameters, *times, asked.user)
-    up = {component_of(one.address) for one in listed.components}
-    raise await _unknown(bus, asked.module, {*at, *others}, silent, up)
+        return part, SwapClass(asked.class_path, asked.parameters, *times, asked.user)
+    if silent:
+        names = ", ".join(map(component_of, silent))
+        may_run_it = f"{asked.module} is not known: {names} does not answer and may run it"
+        raise await _silent(bus, may_run_it, {hosts[unit] for unit in silent})
+    raise await _unknown(bus, asked.module, {*at, *others}, {component_of(one) for one in hosts})
 
 
 def _may_be_exchanged(one: ComponentState) -> bool:
@@ -100,11 +105,29 @@ def _may_be_exchanged(one: ComponentState) -> bool:
     return one.address.startswith(pools) and one.type != EXECUTION_UNIT
 
 
-async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str], up: Collection[str]) -> Refusal:
+async def _silent(bus: Bus, told: str, hosts: Collection[str]) -> Silent:
+    """Return the refusal for a component that does not answer; it names the hosts that do not answer either."""
+
+    async def is_out_of_reach(host: str) -> bool:
+        try:
+            await bus.ask(
+                address(Subsystem.BACKBONE, creator_name(host)), AskTime(), MissionTime, within_s=REPLY_TIME_S
+            )
+        except LinkError:
+            return True
+        return False
+
+    away = ", ".join([host for host in sorted(hosts) if await is_out_of_reach(host)])
+    if not away:
+        return Silent(told)
+    return Silent(
+        f"{told}; nor does the creator of {away}, so that host cannot be reached",
+        remedy=f"Check the link to {away}, then swap again.",
+    )
+
+
+async def _unknown(bus: Bus, name: str, known: Iterable[str], up: Collection[str]) -> Refusal:
     """Return the refusal that explains why no part of this name can be exchanged."""
-    if silent:
-        units = ", ".join(map(component_of, silent))
-        return Silent(f"{name} is not known: {units} does not answer and may run it")
     try:
         placed = await bus.ask(PLACER, ListPlacements(), Placements, within_s=REPLY_TIME_S)
     except LinkError:
@@ -114,10 +137,24 @@ async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str],
         return Silent(f"{name} is stopped: {placed.stopped[name]}", remedy=remedy)
     absent = {one.name: one.type for one in placed.placements if one.name not in up}
     if name in absent:
-        return Silent(f"{name} is not up", remedy=_NOT_UP)
-    if units := ", ".join(one for one, kind in absent.items() if kind == EXECUTION_UNIT):
-        return Silent(f"{name} is not known: {units} is not up and may run it", remedy=_NOT_UP)
+        return await _not_up(bus, f"{name} is not up", [name])
+    if units := [one for one, kind in absent.items() if kind == EXECUTION_UNIT]:
+        return await _not_up(bus, f"{name} is not known: {', '.join(units)} is not up and may run it", units)
     return UnknownModule(f"no module, behavior or resource {name!r} runs{did_you_mean(name, known)}")
+
+
+async def _not_up(bus: Bus, told: str, names: list[str]) -> Silent:
+    """Return the refusal for components that are not up, with the placer's reason."""
+    try:
+        absent = (await bus.ask(PLACER, AskState(), ComponentState, within_s=REPLY_TIME_S)).absent
+    except LinkError:
+        absent = list[Absence]()
+    mine = [one for one in absent if one.name in names]
+    why = "".join(f"; {one.name} {one.cause}" for one in mine)
+    remedies = dict.fromkeys(
+        f"{one.remedy[:1].upper()}{one.remedy[1:]}; then swap again." for one in mine if one.remedy
+    )
+    return Silent(told + why, remedy=" ".join(remedies) or _NOT_UP)
 
 
 _NOT_UP = "Wait until its creator has started it again ('scout-backbone status'), then swap again."

@@ -35,6 +35,7 @@ class PlacementRecord:
         missing_since_s: Mission time from which on it is missing; negative: it is not missing.
         cause: Why it is missing.
         doing: What the placer does to start it again.
+        remedy: What an operator can do; empty: nothing.
     """
 
     spawn: Spawn
@@ -50,6 +51,7 @@ class PlacementRecord:
     missing_since_s: float = -1.0
     cause: str = ""
     doing: str = ""
+    remedy: str = ""
 
     @property
     def address(self) -> str:
@@ -72,10 +74,10 @@ class PlacementRecord:
         self.host, self.pid, self.since_s = host, pid, now_s
         self.reasons, self.lost, self.suspect = (f"{host}: its creator has it",), False, False
 
-    def misses(self, cause: str, now_s: float) -> None:
+    def misses(self, cause: str, now_s: float, remedy: str = "") -> None:
         """Record that the component, which ran, is missing."""
         self.phase, self.host, self.pid, self.suspect = PlacementPhase.WAITING, "", 0, False
-        self.cause, self.doing = cause, "is to be placed again"
+        self.cause, self.doing, self.remedy = cause, "is to be placed again", remedy
         if self.missing_since_s < 0:
             self.missing_since_s = now_s
 

@@ -131,7 +131,7 @@ class PlacementBook:
     def absences(self) -> list[Absence]:
         """Return the wanted components that ran and have no host now. Creators report components that they restart."""
         return [
-            Absence(record.spawn.name, record.missing_since_s, record.cause, record.doing)
+            Absence(record.spawn.name, record.missing_since_s, record.cause, record.doing, record.remedy)
             for record in self.records()
             if record.missing_since_s >= 0 and not record.unwanted
         ]
@@ -269,6 +269,7 @@ class PlacementBook:
         known = self._hosts[host]
         known.view = replace(known.view, alive=False)
         instructions: list[Instruction] = [Note(host, "lost its creator and all its components")]
+        remedy = f"check the link to {host}, or offer it again" if fence_s > 0 else ""
         for record in self.records():
             if record.host != host:
                 continue
@@ -279,7 +280,7 @@ class PlacementBook:
             if record.phase is PlacementPhase.STARTING:
                 continue  # the task that starts it detects the loss and decides
             if record.phase is PlacementPhase.RUNNING and record.spawn.policy.restart and not record.unwanted:
-                record.misses(f"was lost with the creator of {host}", now_s)
+                record.misses(f"was lost with the creator of {host}", now_s, remedy)
                 record.lost = True
                 instructions += [Note(name, f"was lost with {host}"), PlaceAgain(name)]
             else:

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
+import re
+
 import pytest
 
 from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.command_line.swapping import addressed
+from backbone.component.messages import (
+    Absence,
+    AskParameters,
+    AskState,
+    AskTime,
+    ComponentState,
+    LifeState,
+    MissionTime,
+)
 from backbone.errors import Refusal
 from backbone.exchange import Silent, SwapModule, UnknownModule
 from backbone.mission.model import EXECUTION_UNIT
@@ -22,6 +34,7 @@ from backbone.wire import Envelope, Message
         ({"waves": EXECUTION_UNIT}, Silent, "smoothing is not known: waves is not up and may run it"),
         ({"smoothing": "patrol"}, Silent, "smoothing is not up"),
         ({"radio": "command_radio"}, UnknownModule, "'smoothing' runs"),
+        ({"lost": EXECUTION_UNIT}, Silent, "lost was lost with the creator of far .Check the link to far; then swap"),
     ],
 )
 def test_what_is_being_started_again_is_not_called_unknown(
@@ -30,15 +43,53 @@ def test_what_is_being_started_again_is_not_called_unknown(
     async def listed(_asked: Envelope[Message]) -> Message:
         return Components([], complete=True, hub_since_s=0.0)
 
-    async def placements(_asked: Envelope[Message]) -> Message:
+    async def placer(asked: Envelope[Message]) -> Message:
+        if isinstance(asked.body, AskState):
+            away = Absence("lost", 0.0, "was lost with the creator of far", "waits", "check the link to far")
+            return ComponentState(PLACER, "placer", "base", 1, LifeState.READY, 0.0, absent=[away])
         return Placements([Placement(name, kind, "base", "", 0.0, []) for name, kind in placed.items()])
 
     async def scene() -> None:
         bus = LocalNetwork("m").join(NAMESERVER, VirtualClock())
         bus.serve(NAMESERVER, ListComponents, listed)
-        bus.serve(PLACER, ListPlacements, placements)
-        with pytest.raises(refused, match=told):
+        bus.serve(PLACER, ListPlacements | AskState, placer)
+        with pytest.raises(refused) as caught:
             await addressed(bus, SwapModule("smoothing", "pair:Smoothing"))
+        assert re.search(told, str(caught.value))
+        await bus.close()
+
+    run_virtual(scene())
+
+
+@pytest.mark.parametrize(("kind", "name"), [(EXECUTION_UNIT, "mission_control/unit"), ("scout", "resource_pool/rover")])
+@pytest.mark.parametrize(
+    ("creator_answers", "told"),
+    [
+        (True, "The creator replaces a process that hangs"),
+        (False, "nor does the creator of far, so that host cannot be reached .Check the link to far, then swap again"),
+    ],
+)
+def test_a_part_on_a_host_that_cannot_be_reached_is_not_called_a_process_that_hangs(
+    kind: str, name: str, creator_answers: bool, told: str
+) -> None:
+    async def listed(_asked: Envelope[Message]) -> Message:
+        return Components([ComponentState(name, kind, "far", 1, LifeState.READY, 0.0)], complete=True, hub_since_s=0.0)
+
+    async def never(_asked: Envelope[Message]) -> Message:
+        await asyncio.Event().wait()
+        raise AssertionError("waits for ever")
+
+    async def its_time(_asked: Envelope[Message]) -> Message:
+        return MissionTime(0.0, 1.0, 0.0)
+
+    async def scene() -> None:
+        bus = LocalNetwork("m").join(NAMESERVER, VirtualClock())
+        bus.serve(NAMESERVER, ListComponents, listed)
+        bus.serve(name, AskState | AskParameters, never)
+        bus.serve("backbone/creator-far", AskTime, its_time if creator_answers else never)
+        with pytest.raises(Silent) as caught:
+            await addressed(bus, SwapModule("rover", "pair:Smoothing"))
+        assert re.search(told, str(caught.value))
         await bus.close()
 
     run_virtual(scene())
