@@ -264,7 +264,7 @@ class BehaviorExchanges:
         self._tell(going.course.outcome(class_path_of(going.old), going.asked.class_path))
         new = going.new
         order = ReviseStart(new.launch.name, msgspec.to_builtins(new.parameters), going.asked.class_path)
-        return await revise_start(new.gate.bus, order)
+        return await revise_start(new.gate.bus, self.present.clock, order)
 
     async def _forget(self, one: Implementation) -> None:
         life = self._lives[one]

@@ -357,7 +357,7 @@ class DriverExchanges:
         self._tell(going.course.outcome(class_path_of(going.old), going.asked.class_path))
         order = ReviseStart(self._rc.name, msgspec.to_builtins(self._rc.parameters))
         idle = "" if going.slot.calls else "nothing was asked of the new driver during its trial"
-        return "; ".join(filter(None, (idle, await revise_start(self._rc.bus, order))))
+        return "; ".join(filter(None, (idle, await revise_start(self._rc.bus, self._rc.clock, order))))
 
     async def _close(self, driver: object) -> None:
         """Close a driver that is no longer in use; if this fails, log it and go on."""

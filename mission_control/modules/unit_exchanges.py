@@ -200,7 +200,7 @@ class UnitExchanges:
         told = exchange.outcome(candidate.before.class_path, candidate.order.class_path)
         self._tell(candidate.asked, told, LogLevel.NOTICE)
         order = ReviseStart(component.name, msgspec.to_builtins(component.parameters))
-        return exchange.answer(component.clock.now_s(), await revise_start(component.bus, order))
+        return exchange.answer(component.clock.now_s(), await revise_start(component.bus, component.clock, order))
 
     def _tell(self, asked: SwapModule, what: str, level: LogLevel = LogLevel.INFO) -> None:
         self._component.publish_event(asked.module, what, level)

@@ -15,15 +15,18 @@ from hypothesis import strategies as st
 from pool_on_local_network import Pool, WiretappedRadio, a_pool
 from pool_orders import command, connect, connect_robot
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import AskParameters, Parameters, WrongParameter
 from backbone.dependency_database.messages import Resource
 from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
 from backbone.keys import Conversation
+from backbone.placer.messages import ReviseStart, StartRevised
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected
 from backbone.reading_anew import WrongClass
 from backbone.scheduling.requests import RcUse
+from backbone.wire import Envelope
 from resource_pool.commands import Drive, Tune
 from resource_pool.drivers.interface import HardwareFault, UnknownDriver
 from resource_pool.messages import Applied, Frame
@@ -54,6 +57,15 @@ async def swap(pool: Pool, name: str, prove_s: float = 1.0, at: str = AT, **opti
     path = name if ":" in name or name == "simulated" else f"{DRIVERS}:{name}"
     asked = SwapClass(path, options, prove_s, 2.0, user="anna")
     return await pool.voice_of("ui_console/tester").ask(at, asked, Swapped, within_s=60.0)
+
+
+def add_placer(pool: Pool) -> None:
+    """Let a placer take the order for the next start, so that an exchange ends at once."""
+
+    async def revise(_asked: Envelope[ReviseStart]) -> StartRevised:
+        return StartRevised()
+
+    pool.voice_of(PLACER).serve(PLACER, ReviseStart, revise)
 
 
 async def shine(pool: Pool, brightness: float) -> Applied:
@@ -252,6 +264,7 @@ def test_no_call_is_lost_and_nothing_shines_without_a_holder(
 def test_a_radio_goes_on_under_the_same_grant(local_mission: Any) -> None:
     async def main() -> None:
         async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            add_placer(pool)
             await connect_robot(pool, "one", 1)
             await command(pool, "one", 1, Drive(3.0, 3.0))
             swapped = await swap(pool, "pool_on_local_network:WiretappedRadio", at="resource_pool/radio")
@@ -358,6 +371,7 @@ def test_a_grant_may_pass_on_while_no_camera_is_open(local_mission: Any, fault: 
 def test_a_protocol_is_exchanged_under_the_robot_s_name(local_mission: Any) -> None:
     async def main() -> None:
         async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            add_placer(pool)
             await connect_robot(pool, "one", 1)
             at = "resource_pool/scout1"
             Bench.fault = "call"
