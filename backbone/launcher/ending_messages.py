@@ -20,7 +20,7 @@ class MissionEnding(Message, frozen=True):
     """Answer to ``EndMission``: the mission is ending.
 
     Attributes:
-        told: State of the last branch, one line; empty: the mission has none.
+        told: State of the last branch, or what the end waits for, one line; empty: neither.
         within_s: Longest run of the branch, mission seconds; 0: it does not run.
     """
 

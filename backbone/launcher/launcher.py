@@ -19,9 +19,16 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel, Stop, Stopping
-from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnded, Processes, ProcessFell
+from backbone.creator.messages import (
+    READY_WITHIN_S,
+    ListProcesses,
+    ProcessEnded,
+    Processes,
+    ProcessFell,
+)
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.launcher.awaited_hosts import announce_awaited_hosts, awaited_hosts
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.declared_orders import hardware_orders, unit_orders
 from backbone.launcher.ending_messages import AwaitLastBranch, EndMission, LastBranchOver, MissionEnding
@@ -45,7 +52,7 @@ from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
 from backbone.run_files import RunFolderRemoved
-from backbone.waiting import first_of
+from backbone.waiting import end_tasks, first_of
 from backbone.wire import Accepts, Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -202,7 +209,8 @@ class Launcher(Component[NoParameters]):
                 return await self._tree.change(change, asked.source)
             case EndMission(at_once=at_once):
                 self.end(f"ordered by {component_of(asked.source)}", at_once=at_once)
-                return MissionEnding(self._last.doing, self._last.within_s if self._last.is_at_work else 0.0)
+                told = self._last.doing or awaited_hosts(self._others, self.clock)
+                return MissionEnding(told, self._last.within_s if self._last.is_at_work else 0.0)
             case AwaitLastBranch():
                 await self._last_is_over.wait()
                 return LastBranchOver(self._last.told)
@@ -245,7 +253,10 @@ class Launcher(Component[NoParameters]):
         async with self._step("stop consoles"):
             await self._stop_consoles()
         async with self._step("stop mission"):
+            say = announce_awaited_hosts(self._others, self.clock, self._others_changed, self._observer.announce)
+            saying = asyncio.create_task(say, name="say what is awaited")
             await self._stop_mission()
+            await end_tasks(saying)
         for host in self._others.lost:
             self._observer.announce(f"{host} is out of reach: end a command that still offers it there with Ctrl-C")
         if self._others.offering:

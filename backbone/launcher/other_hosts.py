@@ -71,6 +71,10 @@ class OtherHosts:
         """Names of the machines that had a creator in the mission and have none now."""
         return [host for host in self.missing if self._absent[host].was_there]
 
+    def lost_since(self, since_s: float) -> list[str]:
+        """Return the machines that were lost after this mission time."""
+        return [host for host in self.lost if self._absent[host].since_s > since_s]
+
     @property
     def offering(self) -> list[str]:
         """Addresses of the present offers, which keep the creators of these machines."""

@@ -159,6 +159,7 @@ def test_down_names_a_host_that_is_cut_off_because_the_command_there_goes_on(sho
         mission.up.close()
         told = [line for line in mission.up.lines if "is out of reach" in line]
         assert [line.split()[0] for line in told] == ["far"], mission.story()
+        assert any("until what runs on far has ended" in line for line in mission.up.lines), mission.story()
         assert mission.offers["near"].process.wait(10) == 0, mission.story()
         offer = mission.offers["far"].process
         assert {p.pid for p in mission.hosts["far"].processes()} == {offer.pid}

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.command_line.cli import app
+from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
+from backbone.launcher.awaited_hosts import announce_awaited_hosts, awaited_hosts
 from backbone.launcher.other_hosts import OtherHosts, command_on, endpoint_for_others
 from backbone.mission.model import Host, MissionDescription
 from backbone.picture.health import HealthWord, health
+from backbone.waiting import end_tasks
 
 BASE, FAR, ATTIC = (
     Host(name="base", address="192.0.2.1"),
@@ -54,6 +59,26 @@ def test_a_machine_is_lost_if_it_was_there_before() -> None:
     assert others.lost == ["far"]
     others.token_changed("backbone/creator-far", True, 3.0)
     assert others.lost == []
+
+
+def test_the_end_of_a_mission_waits_for_a_host_while_it_may_run_components_and_says_so() -> None:
+    async def main() -> None:
+        clock, changed, said = VirtualClock(), asyncio.Event(), list[str]()
+        others = OtherHosts(mission(BASE, FAR, ATTIC), 0.0)
+        saying = asyncio.create_task(announce_awaited_hosts(others, clock, changed, said.append))
+        for at_s, stands in ((1.0, True), (2.0, False)):
+            await clock.sleep_until_s(at_s)
+            assert awaited_hosts(others, clock) == "", "what was never there runs nothing"
+            others.token_changed("backbone/creator-far", stands, clock.now_s())
+            changed.set()
+        await clock.sleep_until_s(1.9 + CUT_OFF_ENDS_WITHIN_S)
+        assert said == [awaited_hosts(others, clock)]
+        assert "until what runs on far has ended" in said[0]
+        await clock.sleep_until_s(2.0 + CUT_OFF_ENDS_WITHIN_S)
+        assert awaited_hosts(others, clock) == ""
+        await end_tasks(saying)
+
+    run_virtual(main())
 
 
 def test_a_missing_machine_degrades_the_mission() -> None:
