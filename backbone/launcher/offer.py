@@ -45,6 +45,7 @@ from backbone.wire import Accepts, Envelope, Message
 OFFER_TYPE = "offer"
 CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease); a killed hub shows at once and is back within 3 s
 SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, over a slow link by 0.1 s
+COMPARE_EACH_S = 60.0  # chosen: clocks of machines drift apart by a hundredth of a second in this time
 ASK_AGAIN_S = 0.1  # chosen: the nameserver answers that soon after the hub listens
 PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s
 DIAL_TIME_S = 3.0  # chosen: longer than the retransmission of a lost first packet takes
@@ -83,6 +84,7 @@ class MachineOffer(Component[NoParameters]):
         self._creator, self._on_ready, self._recorder = creator, on_ready, recorder
         creator.on_fell, creator.on_changed = self._creator_fell, self.changed
         self._link_up, self._link_fell = asyncio.Event(), asyncio.Event()
+        self._wrong_clock: Absence | None = None
         self.ending = Ending.ORDERED
 
     async def connect(self) -> None:
@@ -97,6 +99,7 @@ class MachineOffer(Component[NoParameters]):
     async def serve(self) -> None:
         """Report that the machine is in the mission."""
         self.start_task(self._watch_folder(), "run folder")
+        self.start_task(self._watch_clock(), "clock")
         self._on_ready()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -106,9 +109,10 @@ class MachineOffer(Component[NoParameters]):
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
-        """Return creator and recorder as absent while they do not run or respond."""
+        """Return creator and recorder while they do not run or respond, and this machine while its clock is wrong."""
         lost = self._recorder.absence() if self._recorder is not None else None
-        return [*self._creator.absences(), *([lost] if lost is not None else [])]
+        own = [absence for absence in (lost, self._wrong_clock) if absence is not None]
+        return [*self._creator.absences(), *own]
 
     async def drain(self) -> None:
         """End the creator and all its components."""
@@ -149,6 +153,28 @@ class MachineOffer(Component[NoParameters]):
         else:
             self._link_up.clear()
             self._link_fell.set()  # stays set until the offer has examined it, even if the link is back at once
+
+    async def _watch_clock(self) -> None:
+        """Report this machine while its clock differs from the mission's; its processes keep the clock they began with.
+
+        A lease begins at the earlier time of two clocks, so a wrong clock shortens grants and never extends them.
+        """
+        while True:
+            await self.clock.sleep_s(COMPARE_EACH_S * self.clock.rate)
+            try:
+                right = await mission_clock(self.bus)
+            except LinkError:
+                continue
+            ahead_s = (self.clock.now_s() - right.now_s()) / self.clock.rate
+            self._wrong_clock = self._absence_of_right_time(ahead_s) if abs(ahead_s) > SAME_TIME_S else None
+            self.changed()
+
+    def _absence_of_right_time(self, ahead_s: float) -> Absence:
+        since_s = self._wrong_clock.since_s if self._wrong_clock is not None else self.clock.now_s()
+        side = "ahead of" if ahead_s > 0 else "behind"
+        cause = f"its clock has drifted {abs(ahead_s):.1f} s {side} the mission's, so grants there may end early"
+        remedy = "end the command there with Ctrl-C and type it again, so that it reads the mission's time"
+        return Absence(self.launch.host, since_s, cause, "goes on with the wrong time", remedy, is_running=True)
 
     async def _is_other_time(self) -> bool:
         """Compare the clocks, retrying because the nameserver may answer a moment after the link is up."""

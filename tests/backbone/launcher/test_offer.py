@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -30,6 +31,7 @@ from backbone.creator.messages import (
 )
 from backbone.launcher import offer as offers
 from backbone.launcher.kept_creator import Offered
+from backbone.launcher.mission_connection import mission_clock
 from backbone.launcher.offer import Ending, MachineOffer, Offering
 from backbone.naming import Subsystem
 from backbone.run_files import RunFolderUnusable
@@ -158,6 +160,29 @@ async def test_a_link_that_is_back_after_a_sleep_of_the_machine_ends_what_runs_h
         scene.bus.link_changed(True)
         assert await scene.ends() is Ending.OTHER_TIME
         assert not scene.creator.runs
+
+
+@pytest.mark.parametrize(
+    ("behind_s", "told"), [(0.1, ""), (2.0, "2.0 s behind the mission's"), (-2.0, "2.0 s ahead of the mission's")]
+)
+async def test_a_machine_whose_clock_has_drifted_says_so(
+    on_a_cable: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, behind_s: float, told: str
+) -> None:
+    compared, times = asyncio.Event(), itertools.count(1)
+
+    async def reading(bus: Bus) -> MissionClock:
+        if next(times) > 1:
+            compared.set()
+        return await mission_clock(bus)
+
+    monkeypatch.setattr(offers, "COMPARE_EACH_S", 0.01)
+    monkeypatch.setattr(offers, "mission_clock", reading)
+    async with on_a_cable(behind_s=behind_s) as scene:
+        await asyncio.wait_for(compared.wait(), WITHIN_S)
+        state = await scene.tester.ask(scene.offer.address, AskState(), ComponentState, within_s=1.0)
+        assert [one.name for one in state.absent] == (["far"] if told else [])
+        assert all(told in one.cause and "Ctrl-C" in one.remedy for one in state.absent)
+        assert scene.creator.runs
 
 
 async def test_a_machine_whose_name_was_given_away_while_it_was_cut_off_ends_what_runs_here(
