@@ -15,6 +15,7 @@ from typing import NamedTuple
 MOST_UNDER_WAY_BYTES = 256 * 1024  # chosen: three pictures of 320 x 240; they fit the queues of a link
 MOST_KEPT_BYTES = 128 * 1024 * 1024  # chosen: 1700 of these pictures, which are two minutes of a camera
 AGAIN_S, AGAIN_MOST_S = 0.25, 2.0  # chosen: a living listener answers sooner; the longest pause is a link's lease
+STILL_COME_S = 2.0  # chosen: the lease of a link; a restarted hub is back sooner
 BACK_S = 0.02  # chosen: longer than a round trip, so that one gap is repaired once
 MOST_LOST = 2**40  # chosen: more than any sender sends; a larger number is ignored
 MOST_STREAMS_HEARD = 1024  # chosen: for one listener; a stream has one sender, but any process may invent streams

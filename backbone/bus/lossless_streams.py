@@ -21,14 +21,13 @@ import zenoh
 
 from backbone.bus.inbox import InboxBus, Payload, Sample
 from backbone.bus.interface import Subscription
-from backbone.bus.lossless import LosslessHearing, LosslessSending
+from backbone.bus.lossless import STILL_COME_S, LosslessHearing, LosslessSending
 from backbone.bus.neighbor_declarations import matches
 from backbone.bus.zenoh_outlets import on_the_wire
 from backbone.bus.zenoh_questions import LONGEST_KEY, is_inbox, new_inbox_key
 from backbone.keys import Conversation, key_of_lossless, keys_of_lossless, listened_to
 from backbone.quality import QUALITY, Quality
 
-STILL_COME_S = 2.0  # chosen: the lease of a link; a restarted hub is back sooner
 MOST_LISTENERS = 4096  # chosen: one for each component of the largest mission; a client may declare any token
 MOST_KEYS_FOUND = 256  # chosen: four times the publishers of a bus
 LEAST_SLASHES = 5  # of scout/<mission>/<subsystem>/<conversation>/all/<listener>

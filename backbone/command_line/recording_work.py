@@ -40,6 +40,7 @@ from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.operating_system.ending_signals import interruptible, orders_to_end
 from backbone.operating_system.own_process import go_behind_others
 from backbone.printable import printable_all
+from backbone.recording.absence import missing_in
 from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.host_ear import HostEar
@@ -130,6 +131,8 @@ async def record_to(
     say(f"{left}: {counted(recorder.written, 'message')}")
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
+    if recorder.away_s:
+        say(f"incomplete: {missing_in(recorder.away_s)}")
     if recorder.deleted:
         say(f"incomplete: {counted(recorder.deleted, 'message')} were in a file that was deleted meanwhile")
     if recorder.was_started_again:

@@ -33,6 +33,7 @@ from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.nameserver.messages import Components, ListComponents
+from backbone.recording.absence import LinkAbsence, missing_in
 from backbone.recording.hearing import Hearing, to_overhear
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import heard_now
@@ -86,6 +87,7 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
         connected(where) as (bus, clock),
         overhearing(bus, clock, wanted.keys, heard) as subscribed,
         until_ended(bus, clock, wanted.for_s) as ended,
+        naming_absences(bus, clock),
     ):
         await first_of(ended.wait(), enough.wait())
         enough.set()
@@ -95,6 +97,22 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
     if dropped := printer.dropped + sum(one.dropped for one in subscribed):
         say(f"incomplete: {counted(dropped, 'message')} came faster than they were read")
     return ExitCode.DONE
+
+
+@asynccontextmanager
+async def naming_absences(bus: Bus, clock: Clock) -> AsyncIterator[None]:
+    """Print each absence of the hub that ended in the block, because messages of that time are missing."""
+    absence = LinkAbsence()
+
+    def changed(is_up: bool) -> None:
+        if away_s := absence.changed(is_up, clock.now_s() / clock.rate):
+            say(f"incomplete: {missing_in(away_s)}")
+
+    watching = bus.watch_link(changed)
+    try:
+        yield
+    finally:
+        watching.close()
 
 
 async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:

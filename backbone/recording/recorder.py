@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from backbone.addresses import COMPONENT_DATABASE, RC_MANAGER
 from backbone.bus.host_copies import copy_at
 from backbone.bus.interface import Bus, Clock, Overhearing, Reply
+from backbone.bus.lossless import STILL_COME_S
 from backbone.component.messages import (
     AskParameters,
     AskState,
@@ -31,6 +32,7 @@ from backbone.keys import ROOT, Conversation
 from backbone.keys import key as key_of
 from backbone.naming import component_of
 from backbone.rc_manager.messages import AskSchedule, AskSnapshot, ScheduleSnapshot
+from backbone.recording.absence import LinkAbsence, missing_in
 from backbone.recording.files import SPLIT_BYTES, SPLIT_S, RecordingFiles
 from backbone.recording.hearing import to_overhear
 from backbone.recording.host_ear import EarTaken, HostEar
@@ -113,6 +115,7 @@ class Recorder:
         self._ended = asyncio.Event()
         self._closing: dict[asyncio.Task[None], None] = {}
         self._has_link, self._is_back = True, asyncio.Event()
+        self._absence, self._has_other_hosts = LinkAbsence(STILL_COME_S if is_lossless else 0.0), False
         self.was_started_again = False
         """True: it ended because a later mission of the same name is up."""
         self.on_flushed: Callable[[], None] = lambda: None
@@ -131,6 +134,11 @@ class Recorder:
     def dropped(self) -> int:
         """Number of messages that were lost because the recorder was too slow."""
         return sum(each.dropped for each in self._subscribed) + (self._ear.dropped if self._ear is not None else 0)
+
+    @property
+    def away_s(self) -> float:
+        """Seconds of the machine in which the hub was away, and an unknown number of messages was lost."""
+        return self._absence.total_s
 
     def end(self) -> None:
         """End in good order; then ``run`` returns."""
@@ -282,6 +290,10 @@ class Recorder:
         if is_up and not self._has_link:
             self._is_back.set()
         self._has_link = is_up
+        if self._ear is None or self._has_other_hosts:  # processes of this host send their copies without a hub
+            away_s = self._absence.changed(is_up, self._clock.now_s() / self._clock.rate)
+            if away_s:
+                self._say(f"{self._who}: {missing_in(away_s)}", LogLevel.WARNING)
 
     async def _end_with_mission(self) -> None:
         """End if a later mission of the same name is up after a loss of the link; write none of its messages then."""
@@ -310,6 +322,7 @@ class Recorder:
         self._bus.publish(self._bus.source, Conversation.LOG, event)
 
     def _heard_far(self, at: str, raw: bytes) -> None:
+        self._has_other_hosts = True
         end, own = 0, f"{ROOT}/{self._bus.mission}/"
         try:
             while (copy := copy_at(raw, end)) is not None:

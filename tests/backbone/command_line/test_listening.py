@@ -150,6 +150,19 @@ def test_who_watches_a_mission_ends_with_it(
     assert "night has ended" in capfd.readouterr().err
 
 
+def test_who_watches_is_told_of_an_absence_of_the_hub(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    @asynccontextmanager
+    async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
+        yield LinkedBus([(0.0, UP), (20.0, DOWN), (21.5, UP)]), VirtualClock()
+
+    monkeypatch.setattr(watching, "connected", connected)
+    run_virtual(watching.watch(ANY, Watched((), for_s=30.0)))
+    told = "incomplete: the hub was away for 1.5 s; an unknown number of messages is missing"
+    assert told in capfd.readouterr().err.splitlines()
+
+
 @pytest.mark.parametrize(("field", "is_told"), [("what", False), ("waht", True)])
 def test_a_field_that_no_message_has_is_told(
     field: str, is_told: bool, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]

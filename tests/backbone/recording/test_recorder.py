@@ -170,6 +170,38 @@ def test_it_ends_when_the_mission_has_ended(tmp_path: Path, local_mission: Any) 
     run_virtual(play())
 
 
+@pytest.mark.parametrize(
+    ("is_lossless", "away_s", "missed_s"), [(False, 0.5, 0.5), (True, 1.9, 0.0), (True, 2.5, 2.5)]
+)
+def test_an_absence_of_the_hub_that_costs_messages_is_told_with_its_length(
+    tmp_path: Path, local_mission: Any, is_lossless: bool, away_s: float, missed_s: float
+) -> None:
+    async def play() -> None:
+        clock = VirtualClock()
+        async with local_mission("local") as network:
+            bus = network.join("backbone/recorder", clock)
+            links: list[Any] = []
+            bus.watch_link = links.append
+            files = RecordingFiles(tmp_path / "it.mcap")
+            recorder = Recorder(bus, clock, files=files, classes=CLASSES, about={}, is_lossless=is_lossless)
+            running = asyncio.create_task(recorder.run())
+            await clock.sleep_s(1.0)
+            links[0](False)
+            await clock.sleep_s(away_s)
+            links[0](True)
+            await clock.sleep_s(1.0)
+            recorder.end()
+            await running
+            assert recorder.away_s == pytest.approx(missed_s)
+            await bus.close()
+
+    run_virtual(play())
+    with (tmp_path / "it.mcap").open("rb") as file:
+        said = [one.body["what"] for one in Recording(file).messages(("*/log",))]
+    line = f"recorder: the hub was away for {missed_s:.1f} s; an unknown number of messages is missing"
+    assert (line in said) is bool(missed_s)
+
+
 def test_it_ends_when_a_later_mission_of_the_name_is_up(tmp_path: Path, local_mission: Any) -> None:
     async def play() -> None:
         clock = VirtualClock()
