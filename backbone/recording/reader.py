@@ -244,27 +244,34 @@ def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
 
     Each sender numbers its messages, and a restarted sender begins again. Messages that are missing between the end of
     a sender and its restart are unknown. A number is missing if its message was lost, if its key was not recorded, or
-    if it is a question without an answer.
+    if it is a question without an answer. A question from before the begin, whose answer came later, does not count.
 
     Args:
         messages: In the order of sending.
     """
     lives: dict[str, list[set[int]]] = {}
     newest: dict[str, tuple[float, float]] = {}
+    began_s, early = math.inf, list[tuple[float, set[int], int]]()
     for message in messages:
+        began_s = min(began_s, message.heard_s)
         if message.source:
             number, at_s = newest.get(message.source, (math.inf, -math.inf))
             if message.sequence <= number and message.at_s > at_s:
                 lives.setdefault(message.source, []).append(set())
                 number = message.sequence
             lives[message.source][-1].add(message.sequence)
+            if message.at_s < began_s:
+                early.append((message.at_s, lives[message.source][-1], message.sequence))
             newest[message.source] = max(number, message.sequence), message.at_s
+    for at_s, life, number in early:
+        if at_s < began_s:
+            life.discard(number)
     missing = {source: sum(map(_gaps, numbers)) for source, numbers in sorted(lives.items())}
     return {source: count for source, count in missing.items() if count}
 
 
 def _gaps(numbers: set[int]) -> int:
-    return max(numbers) - min(numbers) + 1 - len(numbers)
+    return max(numbers) - min(numbers) + 1 - len(numbers) if numbers else 0
 
 
 def check_index(file: IO[bytes]) -> None:

@@ -32,5 +32,15 @@ def test_what_is_missing_in_a_life_counts_though_another_life_had_that_number(
     assert missing_numbers(said) == {source: count for source, count in expected.items() if count}
 
 
+def test_a_question_from_before_the_begin_is_no_gap_to_the_first_message() -> None:
+    """A creator asks once a minute; the answer comes when the recorder is there, the messages between never do."""
+
+    def told(number: int, at_s: float, heard_s: float) -> Recorded:
+        return Recorded("scout/night/backbone/base/ask", SENDERS[1], "AwaitEnd/1", at_s, at_s, heard_s, number, "", {})
+
+    said = [told(30, 3.5, 63.6), told(131, 54.3, 54.4), told(132, 55.3, 55.3), told(134, 56.4, 56.4)]
+    assert missing_numbers(said) == {SENDERS[1]: 1}
+
+
 def gaps(numbers: list[int]) -> int:
     return len({*range(1, numbers[-1])} - {*numbers})
