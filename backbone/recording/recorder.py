@@ -157,7 +157,7 @@ class Recorder:
         if self._ear is not None:
             await self._open_ear(self._ear)
         if not self._host_only:
-            self._overhear()
+            await self._overhear()
         self._bus.watch_link(self._link_changed)
         self._say(f"{self._who} records the mission to {self._files.path.name}", LogLevel.NOTICE)
         on_begun()
@@ -190,14 +190,18 @@ class Recorder:
             log.info("overhears the bus: %s", error)
             self._ear = None
 
-    def _overhear(self) -> None:
+    async def _overhear(self) -> None:
         if self._ear is not None:
             self._subscribed.append(self._bus.overhear(Conversation.FAR, self._heard_far, MOST_WAITING_BYTES))
         else:
+            # Senders learn of one conversation after the other, so some of their first messages are not sent here.
+            settles_s = OVERHEARD_WITHIN_S * self._clock.rate
+            self._writer.begin_at(self._clock.now_s() + settles_s)
             for conversation in to_overhear(self._keys):
                 self._subscribed.append(
                     self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES, lossless=self._is_lossless)
                 )
+            await self._clock.sleep_s(settles_s)
         self._bus.watch_alive("*/*", self._alive_changed)
 
     async def _flush_until_end(self) -> None:

@@ -53,7 +53,7 @@ class RecordingWriter:
         self._hearing = Hearing(classes, keys)
         self._schemas: dict[type[Message], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
-        self._end_s, self._is_finished = math.inf, False
+        self._begin_s, self._end_s, self._is_finished = -math.inf, math.inf, False
         self.written = 0
         """Number of messages so far."""
         self._writer.start(profile=PROFILE, library=PROFILE)
@@ -62,9 +62,13 @@ class RecordingWriter:
             self._writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
 
     def write(self, key: str, raw: bytes, at_s: float) -> None:
-        """Add bytes that arrived at a mission time, if their key is selected and they were sent before the end."""
+        """Add bytes that arrived at a mission time, if their key is selected and they were sent in time."""
         for said_at, message in self._hearing.heard(key, raw, at_s):
             self._write(said_at, message, at_s)
+
+    def begin_at(self, at_s: float) -> None:
+        """From now on skip messages sent before this mission time."""
+        self._begin_s = at_s
 
     def end_at(self, at_s: float) -> None:
         """From now on skip messages sent after this mission time; earlier ones may still arrive."""
@@ -74,7 +78,7 @@ class RecordingWriter:
         # A question comes with its answer, maybe hours later; but nothing is sent before the mission begins.
         is_credible = message.source and -MOST_AHEAD_S <= message.stamp_s <= at_s + MOST_AHEAD_S
         sent_s = message.stamp_s if is_credible else at_s
-        if sent_s > self._end_s:
+        if not self._begin_s <= sent_s <= self._end_s:
             return
         channel, data = self._channel_and_data(key, message)
         sent_ns = _ns(sent_s)

@@ -58,8 +58,9 @@ def recorded(tmp_path: Path, local_mission: Any) -> Callable[..., list[Recorded]
                 bus = network.join("backbone/recorder", clock)
                 files = RecordingFiles(path)
                 recorder = Recorder(bus, clock, files=files, classes=CLASSES, about={}, keys=keys)
-                running = asyncio.create_task(recorder.run())
-                await clock.sleep_s(0.01)
+                begun = asyncio.Event()
+                running = asyncio.create_task(recorder.run(begun.set))
+                await begun.wait()
                 await scene(network.join("resource_pool/scout1", clock), clock, recorder)
                 recorder.end()
                 await running
@@ -83,6 +84,30 @@ def test_all_publications_are_recorded_with_key_sender_and_times(recorded: Calla
     assert {one.key for one in found} == {"scout/local/resource_pool/scout1/log"}
     assert [one.sequence for one in found] == [1, 2, 3, 4, 5]
     assert all(one.stamp_s <= one.heard_s <= one.stamp_s + 0.01 for one in found)
+
+
+def test_what_senders_send_while_they_learn_of_the_recorder_is_left_out(tmp_path: Path, local_mission: Any) -> None:
+    """A sender that knows only some of the subscriptions sends only some of its messages, as if others were lost."""
+
+    async def play() -> None:
+        clock = VirtualClock()
+        async with local_mission("local") as network:
+            bus, scout = network.join("backbone/recorder", clock), network.join("resource_pool/scout1", clock)
+            files = RecordingFiles(tmp_path / "it.mcap")
+            recorder = Recorder(bus, clock, files=files, classes=CLASSES, about={})
+            running = asyncio.create_task(recorder.run())
+            for number in range(100):
+                await clock.sleep_s(0.01)
+                scout.publish(scout.source, Conversation.LOG, event(number))
+            recorder.end()
+            await running
+            await bus.close()
+
+    run_virtual(play())
+    with (tmp_path / "it.mcap").open("rb") as file:
+        found = [one.body["at_s"] for one in Recording(file).messages() if one.source == "resource_pool/scout1"]
+    assert found == [float(number) for number in range(int(found[0]), 100)]
+    assert found[0] >= 10, "the first tenth of a second is left out"
 
 
 def test_only_keys_that_are_meant_are_recorded(recorded: Callable[..., list[Recorded]]) -> None:
@@ -170,9 +195,7 @@ def test_it_ends_when_the_mission_has_ended(tmp_path: Path, local_mission: Any) 
     run_virtual(play())
 
 
-@pytest.mark.parametrize(
-    ("is_lossless", "away_s", "missed_s"), [(False, 0.5, 0.5), (True, 1.9, 0.0), (True, 2.5, 2.5)]
-)
+@pytest.mark.parametrize(("is_lossless", "away_s", "missed_s"), [(False, 0.5, 0.5), (True, 1.9, 0.0), (True, 2.5, 2.5)])
 def test_an_absence_of_the_hub_that_costs_messages_is_told_with_its_length(
     tmp_path: Path, local_mission: Any, is_lossless: bool, away_s: float, missed_s: float
 ) -> None:
@@ -250,7 +273,9 @@ def test_a_long_recording_goes_on_in_further_files(
             recorder = Recorder(
                 bus, clock, files=files, split_s=split_s, split_bytes=split_bytes, classes=CLASSES, about={"a": "b"}
             )
-            running = asyncio.create_task(recorder.run())
+            begun = asyncio.Event()
+            running = asyncio.create_task(recorder.run(begun.set))
+            await begun.wait()
             for number in range(100):
                 await clock.sleep_s(0.1)
                 scout.publish(scout.source, Conversation.LOG, event(number))
