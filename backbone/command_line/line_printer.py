@@ -31,6 +31,8 @@ class LinePrinter:
         self._error: OSError | None = None
         self.dropped = 0
         """Number of lines that the reader did not get because it was too slow."""
+        self.is_stuck = False
+        """Whether the reader had stopped to read when the last line was due."""
         self._thread = threading.Thread(target=self._print, daemon=True)
         self._thread.start()
 
@@ -63,6 +65,7 @@ class LinePrinter:
         if self._error is not None:
             raise self._error
         if self._thread.is_alive():
+            self.is_stuck = True
             self.dropped += self._lines.qsize()
 
     def _print(self) -> None:

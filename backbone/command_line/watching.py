@@ -96,7 +96,7 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
         say(f"none of {counted(came, 'message')} has a value in {wanted.field!r}; --json shows their fields")
     if dropped := printer.dropped + sum(one.dropped for one in subscribed):
         say(f"incomplete: {counted(dropped, 'message')} came faster than they were read")
-    return ExitCode.DONE
+    return ExitCode.UNEXPECTED if printer.is_stuck else ExitCode.DONE
 
 
 @asynccontextmanager
@@ -137,7 +137,7 @@ async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
             say(f"incomplete: {counted(dropped, 'message')} came too fast")
         if printer.dropped:
             say(f"incomplete: {counted(printer.dropped, 'line')} came faster than they were read")
-    return ExitCode.DONE
+    return ExitCode.UNEXPECTED if printer.is_stuck else ExitCode.DONE
 
 
 async def _show_rates(bus: Bus, heard: Sequence[TrafficRow], wanted: Watched, printer: LinePrinter) -> None:

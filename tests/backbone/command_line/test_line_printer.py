@@ -16,7 +16,7 @@ async def main():
     for number in range(1000):
         printer.put(f"{number} {'x' * 500}")
     await printer.end()
-    print(printer.dropped, file=sys.stderr)
+    print(printer.dropped, printer.is_stuck, file=sys.stderr)
 asyncio.run(main())
 """
 
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(60)]
 def test_a_reader_gets_each_line_in_order() -> None:
     done = subprocess.run([sys.executable, "-c", SCRIPT, "20"], capture_output=True, text=True, timeout=30, check=True)
     assert [int(line.partition(" ")[0]) for line in done.stdout.splitlines()] == [*range(1000)]
-    assert done.stderr == "0\n"
+    assert done.stderr == "0 False\n"
 
 
 def test_a_reader_that_does_not_read_holds_up_no_end() -> None:
@@ -35,6 +35,8 @@ def test_a_reader_that_does_not_read_holds_up_no_end() -> None:
         try:
             assert printing.wait(30) == 0
             assert printing.stderr is not None
-            assert 0 < int(printing.stderr.read()) < 1000
+            dropped, is_stuck = printing.stderr.read().split()
+            assert 0 < int(dropped) < 1000
+            assert is_stuck == "True"
         finally:
             printing.kill()

@@ -13,6 +13,7 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import LinkListener, Subscription
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.command_line import watching
+from backbone.command_line.line_printer import LinePrinter
 from backbone.command_line.listening import GONE_AFTER_S, until_ended
 from backbone.command_line.watching import Watched
 from backbone.command_line.where import Where
@@ -148,6 +149,35 @@ def test_who_watches_a_mission_ends_with_it(
     monkeypatch.setattr(watching, "connected", connected)
     assert run_virtual(play()) == pytest.approx(20.0 + GONE_AFTER_S, abs=1.0)
     assert "night has ended" in capfd.readouterr().err
+
+
+class StuckPrinter(LinePrinter):
+    """Prints to a reader that does not read."""
+
+    def put(self, _line: str) -> None:
+        self.dropped += 1
+
+    async def end(self) -> None:
+        await super().end()
+        self.is_stuck = True
+
+
+@pytest.mark.parametrize(
+    "command",
+    [lambda: watching.watch(ANY, Watched((), for_s=2.0)), lambda: watching.top(ANY, Watched((), for_s=2.0), once=True)],
+    ids=["watch", "top"],
+)
+def test_output_that_no_reader_takes_is_no_success(
+    command: Callable[[], Awaitable[ExitCode]], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    @asynccontextmanager
+    async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
+        yield LinkedBus([(0.0, UP)]), VirtualClock()
+
+    monkeypatch.setattr(watching, "connected", connected)
+    monkeypatch.setattr(watching, "LinePrinter", StuckPrinter)
+    assert run_virtual(command()) is ExitCode.UNEXPECTED
+    assert capfd.readouterr().out == ""
 
 
 def test_who_watches_is_told_of_an_absence_of_the_hub(
