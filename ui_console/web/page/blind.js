@@ -7,21 +7,39 @@ import { set } from "./text.js";
 const LOOK_EVERY_MS = 250;
 
 /**
+ * Returns title and text of the warning; a recording has no robots to stop.
+ *
+ * @param {Connection} link
+ * @param {number} hubAgeMs Time from which the server has no link to the mission; negative: it has a link.
+ * @param {boolean} isLive
+ */
+export function warning(link, hubAgeMs, isLive) {
+  const since = (/** @type {number} */ ageMs) => `${Math.max(1, Math.round(ageMs / 1000))} s`;
+  const silence = `This page has received nothing for ${since(link.ageMs)} (${link.why}).`;
+  if (!isLive) return ["NO CONNECTION TO THE RECORDING", silence];
+  const title = link.isUp ? "A STOP PRESSED HERE MAY NOT ARRIVE" : "THIS PAGE CANNOT STOP A ROBOT";
+  if (link.is !== "fresh") return [title, `${silence} The content is that old.`];
+  const nothing = `The server has received nothing from the mission for ${since(hubAgeMs)}.`;
+  return [title, `${nothing} The content is older.`];
+}
+
+/**
  * Shows that the page is cut off, for how long, and other means to stop robots; the page is gray meanwhile. A server
  * without a link to the mission also counts, because its page cannot stop a robot.
  */
 export class Blindness {
   /**
    * @param {{ link: Connection, root: HTMLElement, title: Element, why: Element, areas: HTMLElement[],
-   *   stops: () => Iterable<HTMLButtonElement> }} given
+   *   stops: () => Iterable<HTMLButtonElement>, isLive: () => boolean }} given
    */
-  constructor({ link, root, title, why, areas, stops }) {
+  constructor({ link, root, title, why, areas, stops, isLive }) {
     this.link = link;
     this.root = root;
     this.title = title;
     this.why = why;
     this.areas = areas;
     this.stops = stops;
+    this.isLive = isLive;
     this.hubAgeMs = -1;
     this.wasUp = false;
     setInterval(() => this.look(), LOOK_EVERY_MS);
@@ -46,13 +64,8 @@ export class Blindness {
     for (const area of this.areas) area.inert = this.wasUp && !isUp;
     for (const stop of this.stops()) stop.disabled = !isUp;
     if (!isBlind) return;
-    set(this.title, !isUp ? "THIS PAGE CANNOT STOP A ROBOT" : "A STOP PRESSED HERE MAY NOT ARRIVE");
-    const since = (/** @type {number} */ ageMs) => `${Math.max(1, Math.round(ageMs / 1000))} s`;
-    set(
-      this.why,
-      is === "fresh"
-        ? `The server has received nothing from the mission for ${since(this.hubAgeMs)}. The content is older.`
-        : `This page has received nothing for ${since(this.link.ageMs)} (${this.link.why}). The content is that old.`,
-    );
+    const [title, why] = warning(this.link, this.hubAgeMs, this.isLive());
+    set(this.title, title);
+    set(this.why, why);
   }
 }

@@ -95,6 +95,7 @@ const blindness = new Blindness({
   why: find("blind-why"),
   areas: [find("alarm-bar"), find("stage"), find("side"), find("map")],
   stops: () => queryAll(document, "button.emergency", HTMLButtonElement),
+  isLive: () => playback.now === null,
 });
 new Keys({
   isHeld: () => hand.stick !== "",
