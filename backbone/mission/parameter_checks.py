@@ -23,7 +23,7 @@ from backbone.mission.tables import (
     section,
 )
 from backbone.naming import is_legal
-from backbone.scheduling.rules import SchedulingRules, rule_fault
+from backbone.scheduling.rules import SchedulingRules, aging_fault, rule_fault
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")  # the schema refuses other names
 AGING = "aging_s"
@@ -56,20 +56,15 @@ def check_service_parameters(service: Element, tables: Tables, report: Report) -
 def _check_aging(parameter: Element, tables: Tables, report: Report) -> None:
     """Report ARCs that would rise while a resource is handed over, and override each other before a grant."""
     aging_s = parameter_value(parameter.text("value"))
-    if isinstance(aging_s, bool) or not isinstance(aging_s, int | float) or aging_s <= 0:
+    if isinstance(aging_s, bool) or not isinstance(aging_s, int | float):
         return
     handed_over_s = {
         resource.text("name"): (resource.number("connect-s") or 0.0) + (resource.number("disconnect-s") or 0.0)
         for resource in section(tables.root, "resources")
     }
-    slowest = max(handed_over_s, key=handed_over_s.__getitem__, default="")
-    if slowest and aging_s < handed_over_s[slowest]:
-        report.fault(
-            parameter.place_of("value"),
-            f"{AGING} is {aging_s:g}, and {slowest} needs {handed_over_s[slowest]:g} s to disconnect and connect, "
-            "so waiting ARCs would override each other before a grant",
-            f"Write at least {handed_over_s[slowest]:g}, or 0 (never)",
-        )
+    if fault := aging_fault(aging_s, handed_over_s):
+        longest_s = max(handed_over_s.values())
+        report.fault(parameter.place_of("value"), fault, f"Write at least {longest_s:g}, or 0 (never)")
 
 
 def check_class_parameters(element: Element, reserved: Collection[str], tables: Tables, report: Report) -> None:

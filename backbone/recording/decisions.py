@@ -21,9 +21,9 @@ from backbone.rc_manager.messages import Decided, ScheduleSnapshot, TraceLine
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.revival import Reviver
 from backbone.scheduling import snapshot
-from backbone.scheduling.events import Event, Instruction, Record, Woken
+from backbone.scheduling.events import Event, Instruction, RcKnown, Record, Woken
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.rules import SchedulingRules, aging_fault
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.spoken import counted
 
@@ -170,7 +170,7 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
 
     Raises:
         NotRecorded: The recording has no snapshot after ``since_s``, or rules were given and the begin is missing.
-        NoSuchRule: The scheduler has no rule of this name, or the rule has no such value.
+        NoSuchRule: The scheduler has no rule of this name, or the rule has no such value in this mission.
         WrongPlanner: The planner among the rules is not a planner.
         NoSnapshot: The recording is of another release.
     """
@@ -220,10 +220,19 @@ class _Anew:
 
     def __init__(self, begin: ScheduleSnapshot, rules: dict[str, Any]) -> None:
         self._manager = _first(begin, rules)
+        self._aging_s = self._manager.rules.aging_s if "aging_s" in rules else 0.0
         self._as_recorded = snapshot.read(begin.state) if rules else None
 
     def decide(self, event: Event, at_s: float) -> tuple[Record, ...]:
-        """Decide on a recorded event; return the lines to compare."""
+        """Decide on a recorded event; return the lines to compare.
+
+        Raises:
+            NoSuchRule: The RC of the event is handed over more slowly than waiting ARCs rise by the given rules.
+        """
+        if isinstance(event, RcKnown) and (
+            fault := aging_fault(self._aging_s, {event.rc: event.connect_s + event.disconnect_s})
+        ):
+            raise NoSuchRule(fault)
         if self._as_recorded is not None:
             self._as_recorded.handle(event, at_s)
         return self.lines(self._manager.handle(event, at_s))

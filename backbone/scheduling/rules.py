@@ -6,6 +6,7 @@ Rule of this file: plain data with its ranges, so that the same types validate a
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Literal, get_args
 
 from msgspec import Meta, Struct, ValidationError, convert
@@ -110,3 +111,23 @@ def rule_fault(rule: str, value: object) -> str:
     except ValidationError as error:
         return str(error)
     return ""
+
+
+def aging_fault(aging_s: float, handed_over_s: Mapping[str, float]) -> str:
+    """Return why waiting ARCs cannot rise each time this many seconds have passed; empty: they can.
+
+    Args:
+        aging_s: The rule; 0: they never rise.
+        handed_over_s: RC → seconds that it needs to disconnect and connect.
+
+    Example:
+        >>> aging_fault(2.0, {"video1": 3.0, "radio": 0.5}).partition(", so")[0]
+        'aging_s is 2, and video1 needs 3 s to disconnect and connect'
+    """
+    slowest = max(handed_over_s, key=handed_over_s.__getitem__, default="")
+    if not slowest or not 0 < aging_s < handed_over_s[slowest]:
+        return ""
+    return (
+        f"aging_s is {aging_s:g}, and {slowest} needs {handed_over_s[slowest]:g} s to disconnect and connect, "
+        "so waiting ARCs would override each other before a grant"
+    )

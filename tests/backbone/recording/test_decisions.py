@@ -18,7 +18,7 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.rc_manager.messages import AskWhy
+from backbone.rc_manager.messages import AskWhy, Decided
 from backbone.recording.decisions import NoSuchRule, NotRecorded, decided_anew, schedule_at
 from backbone.recording.hearing import to_overhear
 from backbone.recording.known_messages import message_classes
@@ -26,7 +26,7 @@ from backbone.recording.reader import Recorded, Recording
 from backbone.recording.reasons import reasons_at
 from backbone.recording.revival import message_as_sent, revived
 from backbone.recording.writer import RecordingWriter
-from backbone.scheduling.events import Woken
+from backbone.scheduling.events import RcKnown, Woken
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.fairness import Turns
 from backbone.scheduling.own_planner import WrongPlanner
@@ -154,6 +154,23 @@ def test_what_is_missing_is_counted_and_no_difference(recorded: RecordMission):
     found = [decided_anew(recorded(seed, lost)) for seed in (1, 2, 3)]
     assert all(one.difference is None for one in found)
     assert sum(one.missing for one in found) > 0
+
+
+def test_aging_before_the_slowest_resource_is_handed_over_is_refused_as_in_a_mission_file(recorded: RecordMission):
+    file = io.BytesIO()
+    writer = RecordingWriter(file, CLASSES, {})
+    for one in recorded(1).messages(source=RC_MANAGER):
+        said = message_as_sent(CLASSES, one)
+        assert said is not None
+        if isinstance(said, Decided) and isinstance(said.event, RcKnown):
+            slow = msgspec.structs.replace(said.event, connect_s=2.0, disconnect_s=1.0)
+            said = msgspec.structs.replace(said, event=slow)
+        raw = write(Envelope(WIRE_VERSION, one.source, one.sequence, one.at_s, one.cause, said))
+        writer.write(one.key, raw, one.at_s)
+    writer.finish()
+    with pytest.raises(NoSuchRule, match=r"aging_s is 2, and \w+ needs 3 s to disconnect and connect"):
+        decided_anew(Recording(file), aging_s=2.0)
+    assert decided_anew(Recording(file), aging_s=3.0).unread == 0
 
 
 @pytest.mark.parametrize("body", [["of another release"], None])
