@@ -129,7 +129,8 @@ def read_marks(text: str) -> list[Mark]:
 def sightings(messages: Iterable[Recorded]) -> list[WatcherReport]:
     """Return the sightings among these messages; skip a sighting without time or robot."""
     seen = (one.body for one in messages if one.schema.partition("/")[0] == SIGHTING and isinstance(one.body, dict))
-    return [WatcherReport(body["at_s"], body["robot"]) for body in seen if {"at_s", "robot"} <= body.keys()]
+    told = ((body.get("at_s"), body.get("robot")) for body in seen)
+    return [WatcherReport(at_s, robot) for at_s, robot in told if isinstance(at_s, float) and isinstance(robot, str)]
 
 
 def detected(marks: Sequence[Mark], seen: Iterable[WatcherReport], lasted_s: float) -> DetectionRates:

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from backbone.command_line.comparing import compare_detection
 from backbone.launcher.endings import ExitCode
 from backbone.recording.detection import SIGHTING, Mark, NoMarks, WatcherReport, detected, read_marks, worse
+from backbone.recording.detection import sightings as sightings_in
 from backbone.recording.known_messages import message_classes
 from backbone.recording.presence import Presence
+from backbone.recording.reader import Recorded
 from backbone.recording.writer import RecordingWriter
 from backbone.wire import Envelope, schema_of, write
 from mission_control.messages import MotionSeen, Region
@@ -44,6 +46,16 @@ def test_each_mark_is_detected_or_missed_and_each_sighting_counts(told: list[Mar
         for mark, after_s in zip(told, found.delays_s, strict=True)
         if after_s is not None
     )
+
+
+@pytest.mark.parametrize("body", [{"at_s": None, "robot": "scout1"}, {"at_s": "1", "robot": "scout1"}, {"at_s": 1.0}])
+def test_a_sighting_without_a_time_or_a_robot_is_left_out(body: dict[str, object]) -> None:
+    """A time that is not finite is null in a recording."""
+
+    def told(body: object) -> Recorded:
+        return Recorded("scout/night/x/y/events", "x/y", f"{SIGHTING}/1", 1.0, 1.0, 1.0, 1, "", body)
+
+    assert [one.at_s for one in sightings_in([told(body), told({"at_s": 2.0, "robot": "scout1"})])] == [2.0]
 
 
 @given(marks)
