@@ -52,6 +52,7 @@ from backbone.recording.revival import Reviver
 from backbone.spoken import counted
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
+SHORTEST_RATED_S = 1.0  # chosen: two messages within a millisecond are no thousand a second
 VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
 
 
@@ -299,8 +300,8 @@ async def print_keys(path: Path, *, as_json: bool) -> ExitCode:
 
 
 def _rate(messages: int, lasted_s: float) -> str:
-    """Return messages a second; messages of one instant have no rate."""
-    return f"{messages / lasted_s:9.2f}/s" if lasted_s else f"{'-':>9s}  "
+    """Return messages a second; messages of a moment have no rate."""
+    return f"{messages / lasted_s:9.2f}/s" if lasted_s >= SHORTEST_RATED_S else f"{'-':>9s}  "
 
 
 async def print_messages(

@@ -54,8 +54,11 @@ async def test_an_event_of_several_lines_is_one_line_and_forges_no_other(
     assert r"is well\n " in line
 
 
-@pytest.mark.parametrize(("times_s", "shown"), [((1.0, 1.0), "2         -  "), ((1.0, 3.0), "2      1.00/s")])
-async def test_messages_of_one_instant_have_no_rate(
+@pytest.mark.parametrize(
+    ("times_s", "shown"),
+    [((1.0, 1.0), "2         -  "), ((1.0, 1.000_001), "2         -  "), ((1.0, 3.0), "2      1.00/s")],
+)
+async def test_messages_of_a_moment_have_no_rate(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], times_s: tuple[float, ...], shown: str
 ) -> None:
     path = tmp_path / "night.mcap"
