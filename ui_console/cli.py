@@ -9,7 +9,6 @@ import typer
 
 from backbone.command_line.options import CommandTable, SecretFile, Version, chosen, run, run_table
 from backbone.command_line.where import Where
-from backbone.launcher.endings import ExitCode, say
 from ui_console import options as words
 from ui_console.model.profile import Profile, Sight
 
@@ -214,10 +213,9 @@ def _watch_recording(path: Path, user: str, *, names_mission: bool, for_programs
     run(lambda: watch_recording(path, user))
 
 
-def _usage(complaint: str) -> typer.Exit:
-    """Print the fault in the command's arguments, and return the exception that ends the command."""
-    say(complaint)
-    return typer.Exit(ExitCode.USAGE)
+def _usage(complaint: str) -> typer.BadParameter:
+    """Return the exception that ends the command with the fault in its arguments."""
+    return typer.BadParameter(complaint)
 
 
 def _need_a_terminal(command: str, instead: str) -> None:

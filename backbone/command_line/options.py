@@ -24,6 +24,7 @@ from backbone import __version__
 from backbone.authentication import is_address
 from backbone.command_line.standard_streams import standard_streams
 from backbone.command_line.where import Where
+from backbone.command_line.wrong_words import WRONG_WORDS, is_request_for_help, refusal_of
 from backbone.errors import BackboneError
 from backbone.launcher.endings import ExitCode, complaint_of, say
 from backbone.naming import IllegalName, legal
@@ -71,11 +72,13 @@ def run_table(table: typer.Typer) -> None:
             commands[:] = [each for each in commands if [_name_of(each)] == named]
     with standard_streams():
         try:
-            table()
+            sys.exit(table(standalone_mode=False))
         except KeyboardInterrupt:
             sys.exit(ExitCode.INTERRUPTED)
-        except BackboneError as error:
-            message, code = complaint_of(error)
+        except (BackboneError, WRONG_WORDS) as error:
+            if is_request_for_help(error):
+                table()
+            message, code = complaint_of(error if isinstance(error, BackboneError) else refusal_of(error))
             say(message)
             sys.exit(code)
 
