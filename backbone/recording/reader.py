@@ -321,6 +321,10 @@ def _recorded(channel: Channel, message: Message) -> Recorded:
     except RecursionError:
         return Recorded(key, source, "", at_s, at_s, at_s, message.sequence, "", message.data)
     try:
-        return Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)
+        found = Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)
     except TypeError as error:
         raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: {error}") from error
+    numbers = found.stamp_s, found.heard_s, found.sequence
+    if not (all(isinstance(one, int | float) for one in numbers) and isinstance(found.cause, str)):
+        raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: it has no numbers")
+    return found

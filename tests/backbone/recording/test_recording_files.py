@@ -292,7 +292,10 @@ def test_copies_inside_copies_are_not_followed() -> None:
     assert [one.schema for one in read(file.getvalue())] == ["Told/1", ""]
 
 
-@pytest.mark.parametrize("data", [b"{}", b"7", b'{"x": 1}', b"[]"])
+UNNUMBERED = b'{"stamp_s":"soon","heard_s":1.0,"sequence":1,"cause":"","body":{}}'
+
+
+@pytest.mark.parametrize("data", [b"{}", b"7", b'{"x": 1}', b"[]", UNNUMBERED])
 def test_messages_of_another_form_are_refused(data: bytes) -> None:
     with pytest.raises(NotOfMessages):
         read(foreign(PROFILE, data).getvalue())
