@@ -15,6 +15,7 @@ from rich.text import Text
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.naming import Subsystem, component_of
+from backbone.picture.fitted_table import FittedTable
 from backbone.picture.health import HealthWord
 from backbone.picture.mission import MissionPicture
 from backbone.scheduling.requests import RequestState
@@ -181,9 +182,9 @@ def screen(picture: MissionPicture) -> RenderableType:
     return Group(*parts)
 
 
-def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> Table:
-    """Return a table in which only the last column wraps."""
-    drawn = Table(title=title, title_justify="left")
+def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> FittedTable:
+    """Return a table in which only the last column wraps; a narrow terminal shows its rows as text."""
+    drawn = FittedTable(title=title, title_justify="left")
     for column in columns:
         drawn.add_column(column, justify="right" if column in _NUMBERS else "left", no_wrap=column != columns[-1])
     for row in rows:
@@ -191,7 +192,7 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str | Text
     return drawn
 
 
-def _components_table(picture: MissionPicture) -> Table:
+def _components_table(picture: MissionPicture) -> FittedTable:
     """Return every component under its subsystem."""
 
     def row(first: str, one: ComponentState) -> tuple[str, ...]:
@@ -207,7 +208,7 @@ def _components_table(picture: MissionPicture) -> Table:
     return table("components", ("subsystem", "component", "type", "host", "pid", "state", "restarts", "doing"), rows)
 
 
-def _rcs_table(schedule: Schedule) -> Table:
+def _rcs_table(schedule: Schedule) -> FittedTable:
     """Return the table of the RCs with their present and next holders."""
 
     def row(rc: RcView) -> tuple[str, ...]:
@@ -233,7 +234,7 @@ def _coming(rc: RcView) -> list[str]:
     return [*first, f"{len(rc.next) - len(first)} more"] if len(rc.next) > len(first) else first
 
 
-def _requests_table(schedule: Schedule, now_s: float) -> Table:
+def _requests_table(schedule: Schedule, now_s: float) -> FittedTable:
     """Return the table of the requests: state, times, reasons."""
 
     def row(one: RequestView) -> tuple[str | Text, ...]:

@@ -105,6 +105,24 @@ def test_the_whole_picture_names_what_the_fitted_one_leaves_out() -> None:
     assert all(f"part{number:02}" in shown for number in range(40))
 
 
+@pytest.mark.parametrize("width", [40, 80])
+def test_a_narrow_terminal_shows_every_cell_of_the_whole_picture(width: int) -> None:
+    shown = " ".join(drawn(screen(picture(*FEW)), width).split())
+    for text in (
+        "backbone component late, type kind, host base, pid 4711, state connecting, doing late at work",
+        "component placer, type kind, host base, pid 4711, state ready, doing placer at work",
+        "scout1 kind scout, state up, holder watch1-capture, epoch 427, since 3.0 s",
+        "watch2-capture state waiting, for 3.0 s, until / expected in 2.5 s, turns 2, priority m:1",
+    ):
+        assert text in shown
+    assert "…" not in shown
+
+
+def test_a_table_that_fits_is_a_table() -> None:
+    shown = drawn(screen(picture(*FEW)), 120)
+    assert "│                 │ placer    │ kind │ base │ 4711 │ ready " in shown
+
+
 def test_the_whole_picture_tells_until_when_an_rc_is_held_who_follows_and_what_ends_a_wait_without_end() -> None:
     holder = Holder("guard-capture", 7, 3.0, 7.0)
     rc = RcView(
