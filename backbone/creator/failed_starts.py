@@ -16,6 +16,7 @@ from backbone.printable_text import printable
 
 LAST_LINES = 20
 _STACK_LINE = re.compile(r'  File "(.*)", line (\d+) in (.*)$')
+_ESCAPED = re.compile(r"\\(?:x([0-9a-f]{2})|u((?!d[89a-f])[0-9a-f]{4})|U(000[0-9a-f]{5}))")  # no lone surrogates
 _STACK_CUT = "  ..."  # the last line of a stack of more than a hundred calls
 _LOGGED = (EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB)
 _LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
@@ -52,7 +53,10 @@ def place_of_hang(lines: Sequence[str]) -> str:
         if found is None:
             break
         place = found
-    return printable(f"{place[1]}, line {place[2]}, in {place[3]}") if place else ""
+    if place is None:
+        return ""
+    file = _ESCAPED.sub(lambda found: chr(int(found[found.lastindex or 0], 16)), place[1])  # the interpreter escapes
+    return printable(f"{file}, line {place[2]}, in {place[3]}")
 
 
 def _end_of_log(run_directory: str, name: str) -> list[str]:

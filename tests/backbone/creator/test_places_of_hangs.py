@@ -32,6 +32,12 @@ def test_the_place_is_that_of_the_main_thread_s_innermost_call(tmp_path: Path) -
     assert place_in(tmp_path, STACKS) == "/home/anna/pan.py, line 12, in update"
 
 
+def test_a_file_with_letters_beyond_ascii_is_named_as_it_is(tmp_path: Path) -> None:
+    """The interpreter escapes them in its stacks."""
+    stacks = STACKS.replace("/home/anna", r"/home/J\xf6rg/\u0141\U0001f916\udcff")
+    assert place_in(tmp_path, stacks) == r"/home/Jörg/Ł🤖\udcff/pan.py, line 12, in update"
+
+
 def test_a_stack_that_the_interpreter_cuts_has_its_place_too(tmp_path: Path) -> None:
     assert place_in(tmp_path, f"{STACKS}  ...\n") == "/home/anna/pan.py, line 12, in update"
 
