@@ -203,6 +203,19 @@ def test_what_obey_returned_in_place_of_applied_values_is_told(local_mission: An
     run_virtual(main())
 
 
+def test_of_applied_values_a_number_that_is_not_finite_is_left_out(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            lamp = await pool.start(SilentLamp, "lights", {"driver": "resource_pool.rcs.skeleton:PaintedLamp"})
+            lamp.given = {"range_m": float("nan"), "echo_s": float("inf"), "brightness": 1.0}
+            await _connect(pool, "one")
+            order = Shine(1.0).under("one", 1)
+            applied = await pool.voice("one").ask("resource_pool/lights", order, Applied, within_s=1.0)
+            assert applied.values == {"brightness": 1.0}
+
+    run_virtual(main())
+
+
 class WarmingLamp(Lamp):
     """A lamp that needs 0.3 s until it shines."""
 
