@@ -16,7 +16,7 @@ from enum import StrEnum
 from typing import Annotated
 
 from backbone.component.messages import Absence, ComponentState
-from backbone.picture.words import absence_line
+from backbone.picture.words import absence_lines
 from backbone.ranges import MANY
 from backbone.wire import Message, plain
 
@@ -45,8 +45,8 @@ class MissionHealth(Message, frozen=True):
     absent: Annotated[list[Absence], MANY] = []
 
     def lines(self, now_s: float) -> list[str]:
-        """Return one line for each absent component, for people."""
-        return [absence_line(absence, now_s) for absence in self.absent]
+        """Return the absences for people; see ``absence_lines``."""
+        return absence_lines(self.absent, now_s)
 
     def to_json(self) -> dict[str, object]:
         """Return ``health`` and ``absent`` as plain data."""

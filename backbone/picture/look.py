@@ -21,15 +21,14 @@ from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import component_of
 from backbone.picture.mission import MissionPicture, misses
+from backbone.picture.words import counted_names
 from backbone.printable import printable_all
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
-from backbone.spoken import counted
 from backbone.wire import Message
 
 LOOK_TIME_S = 0.8  # chosen: a hung service is shown within 1 s; a starved one answers sooner
 TYPES_WITHIN_S = 4.0  # chosen: the component database waits 3 s for the nameserver
-NAMES_SHOWN = 8  # chosen: they fit a line of a terminal
 
 
 async def look(
@@ -145,17 +144,11 @@ def _lacks(listing: Components, processes: Iterable[ProcessState]) -> list[str]:
     starting = {process.spawn.name for process in kept if not process.pid and not process.last_end} - listed - unknown
     lines = []
     if unknown:
-        lines.append(f"the list is incomplete: no word yet from {_count(unknown)}")
+        lines.append(f"the list is incomplete: no word yet from {counted_names(sorted(unknown))}")
     if starting:
-        lines.append(f"the list is incomplete: still being started: {_count(starting)}")
+        lines.append(f"the list is incomplete: still being started: {counted_names(sorted(starting))}")
     if running:
-        lines.append(f"the list is incomplete: running and not registered yet: {_count(running)}")
+        lines.append(f"the list is incomplete: running and not registered yet: {counted_names(sorted(running))}")
     elif not listing.complete and not lines:
         lines.append("the list may be incomplete: the nameserver has just started, and components still register again")
     return lines
-
-
-def _count(names: Iterable[str]) -> str:
-    found = sorted(names)
-    more = f" and {len(found) - NAMES_SHOWN} more" if len(found) > NAMES_SHOWN else ""
-    return f"{counted(len(found), 'component')} ({', '.join(found[:NAMES_SHOWN])}{more})"

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 from backbone.component.messages import Absence, StandingStop
 from backbone.mission_log.people import People
 from backbone.scheduling.views import RequestView
+from backbone.spoken import counted
+
+NAMES_SHOWN = 8  # chosen: they fit a line of a terminal
 
 WANTED = "self"
 """The reason for a robot that the console itself gave back."""
@@ -69,10 +74,38 @@ def absence_line(absence: Absence, now_s: float) -> str:
         >>> absence_line(Absence("scout1", 2.0, "killed by SIGKILL", "starts again in 0.1 s"), 3.5)
         'scout1 is absent for 1.5 s: killed by SIGKILL; starts again in 0.1 s'
     """
+    return f"{absence.name} {_trouble(absence, now_s)}"
+
+
+def absence_lines(absences: Iterable[Absence], now_s: float) -> list[str]:
+    """Return a line for each absence, or one for all that differ in nothing but their names, if these are many."""
+    alike: dict[str, list[str]] = {}
+    for absence in absences:
+        alike.setdefault(_trouble(absence, now_s), []).append(absence.name)
+    lines = []
+    for trouble, names in alike.items():
+        subjects = names if len(names) <= NAMES_SHOWN else [f"each of {counted_names(names)}"]
+        lines += [f"{subject} {trouble}" for subject in subjects]
+    return lines
+
+
+def _trouble(absence: Absence, now_s: float) -> str:
     is_what = "has not worked" if absence.is_running else "is absent"
-    parts = [f"{absence.name} {is_what} for {max(0.0, now_s - absence.since_s):.1f} s: {absence.cause}"]
-    parts += [part for part in (absence.doing, absence.remedy) if part]
-    return "; ".join(parts)
+    lasts_s = max(0.0, now_s - absence.since_s)
+    return "; ".join(
+        [f"{is_what} for {lasts_s:.1f} s: {absence.cause}", *filter(None, (absence.doing, absence.remedy))]
+    )
+
+
+def counted_names(names: Sequence[str]) -> str:
+    """Return the number of these components and the first names.
+
+    Example:
+        >>> counted_names(["radio", "scout1"])
+        '2 components (radio, scout1)'
+    """
+    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    return f"{counted(len(names), 'component')} ({', '.join(names[:NAMES_SHOWN])}{more})"
 
 
 def stop_line(name: str, stop: StandingStop, now_s: float) -> str:

@@ -16,7 +16,7 @@ from backbone.creator.messages import ListProcesses, Processes, ProcessState, Sp
 from backbone.errors import LinkError
 from backbone.nameserver.messages import Components, Disappeared, ListComponents
 from backbone.naming import Subsystem
-from backbone.picture.health import HealthWord
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture, misses
 from backbone.picture.screen import live_screen, screen
@@ -117,6 +117,18 @@ def test_what_creators_say_of_a_component_counts(state: ProcessState, word: Heal
     picture = looked(processes=(state,))
     assert picture.health.word is word
     assert says in "\n".join(picture.health.lines(picture.at_s))
+
+
+def test_many_absences_for_the_same_reason_are_one_line() -> None:
+    lost = [Absence(f"scout{number}", 2.0, "was lost", "is being placed again") for number in range(1, 101)]
+    placer = Absence("placer", 2.0, "was lost", "is being placed again", is_running=True)
+    lines = MissionHealth(HealthWord.DEGRADED, [placer, *lost]).lines(7.5)
+    assert lines == [
+        "placer has not worked for 5.5 s: was lost; is being placed again",
+        "each of 100 components (scout1, scout2, scout3, scout4, scout5, scout6, scout7, scout8 and 92 more) "
+        "is absent for 5.5 s: was lost; is being placed again",
+    ]
+    assert len(MissionHealth(HealthWord.DEGRADED, lost[:8]).lines(7.5)) == 8
 
 
 def test_a_component_that_failed_is_absent_until_it_is_registered_again() -> None:
