@@ -8,18 +8,12 @@ from typing import Annotated
 
 import typer
 
-from backbone.command_line.options import complete_behavior, complete_mission, hub_endpoint, names_for, shown_name
+from backbone.command_line.options import complete_behavior, complete_mission, complete_robot, hub_endpoint, shown_name
 from ui_console.model.profile import Profile
 
 LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
 LONGEST_WAIT_S = 86_400.0  # chosen: a day, as in a mission file
 SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
-
-
-def complete_robot(ctx: typer.Context) -> list[str]:
-    """Return the robots of the running mission, for shell completion."""
-    names = names_for(ctx)
-    return names.robots if names is not None else []
 
 
 def _named_or_left_out(ctx: typer.Context, parameter: typer.CallbackParam, value: str) -> str:

@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import cache
 from typing import Any, Protocol, TypeVar
 
 from backbone.bus.bus_base import BusBase
@@ -274,21 +275,13 @@ def bytes_of(payload: Payload | None, most_bytes: int = MAX_MESSAGE_BYTES) -> by
     return payload.to_bytes()
 
 
-_readers: dict[Accepts, Reader[Message]] = {}
-_reply_readers: dict[type[Message], Reader[Message]] = {}
-
-
+@cache
 def reader_of(accepts: Accepts) -> Reader[Message]:
     """Return the reader of these messages."""
-    reader = _readers.get(accepts)
-    if reader is None:
-        reader = _readers[accepts] = Reader(accepts)
-    return reader
+    return Reader(accepts)
 
 
+@cache
 def reply_reader_of(reply: type[Message]) -> Reader[Message]:
     """Return the reader of this answer or a refusal."""
-    reader = _reply_readers.get(reply)
-    if reader is None:
-        reader = _reply_readers[reply] = Reader(reply | Refused)
-    return reader
+    return Reader(reply | Refused)

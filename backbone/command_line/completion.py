@@ -7,19 +7,14 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import TypeVar
 
 from backbone.authentication import read_secret_file
-from backbone.bus.interface import Bus, Clock
 from backbone.errors import BackboneError
 from backbone.launcher.mission_connection import connected
 from backbone.picture.look import look, types_of
 from backbone.picture.names import names_in
 from backbone.run_names import MissionNames
-
-Answer = TypeVar("Answer")
 
 WITHIN_S = 1.5  # chosen: a person does not wait longer after Tab
 
@@ -27,28 +22,16 @@ WITHIN_S = 1.5  # chosen: a person does not wait longer after Tab
 def names_now(mission: str | None, connect: str | None, secret_file: Path | None) -> MissionNames | None:
     """Return the names of a mission; None if no mission is up or it does not answer within ``WITHIN_S``."""
 
-    async def ask(bus: Bus, clock: Clock) -> MissionNames:
-        picture, types = await asyncio.gather(look(bus, clock.now_s(), rate=clock.rate), types_of(bus))
-        return names_in(picture, types)
-
-    return _answer_now(mission, connect, secret_file, ask)
-
-
-def _answer_now(
-    mission: str | None,
-    connect: str | None,
-    secret_file: Path | None,
-    ask: Callable[[Bus, Clock], Awaitable[Answer]],
-) -> Answer | None:
-    async def answer() -> Answer:
+    async def ask() -> MissionNames:
         secret = read_secret_file(secret_file) if connect is not None and secret_file is not None else ""
         async with (
             asyncio.timeout(WITHIN_S),
             connected(mission, connect, f"ui_console/complete-{os.getpid()}", secret) as (bus, clock),
         ):
-            return await ask(bus, clock)
+            picture, types = await asyncio.gather(look(bus, clock.now_s(), rate=clock.rate), types_of(bus))
+            return names_in(picture, types)
 
     try:
-        return asyncio.run(answer())
+        return asyncio.run(ask())
     except (BackboneError, TimeoutError, OSError):
         return None

@@ -225,42 +225,23 @@ def names_for(ctx: typer.Context) -> Any:
     return names_now(*typed)
 
 
-def complete_name(ctx: typer.Context) -> list[str]:
-    """Return the names that questions may use in the mission that is up."""
-    names = names_for(ctx)
-    return names.all if names is not None else []
+def completing(*lists: str) -> Callable[[typer.Context], list[str]]:
+    """Return a completion with the names in these lists of ``MissionNames``, of the mission that is up."""
+
+    def complete(ctx: typer.Context) -> list[str]:
+        names = names_for(ctx)
+        return sorted({name for each in lists for name in getattr(names, each)}) if names is not None else []
+
+    return complete
 
 
-def complete_resource(ctx: typer.Context) -> list[str]:
-    """Return the resources of the mission that is up."""
-    names = names_for(ctx)
-    return names.resources if names is not None else []
-
-
-def complete_behavior(ctx: typer.Context) -> list[str]:
-    """Return the behaviors of the mission that is up."""
-    names = names_for(ctx)
-    return names.behaviors if names is not None else []
-
-
-def complete_exchangeable(ctx: typer.Context) -> list[str]:
-    """Return the behaviors and resources of the mission that is up."""
-    names = names_for(ctx)
-    return sorted({*names.behaviors, *names.resources}) if names is not None else []
-
-
-def complete_type(ctx: typer.Context) -> list[str]:
-    """Return the component types of the mission that is up."""
-    names = names_for(ctx)
-    return names.types if names is not None else []
-
-
-def complete_person(ctx: typer.Context) -> list[str]:
-    """Return the people at the consoles of the mission that is up."""
-    names = names_for(ctx)
-    return names.people if names is not None else []
-
-
+complete_name = completing("all")
+complete_resource = completing("resources")
+complete_robot = completing("robots")
+complete_behavior = completing("behaviors")
+complete_exchangeable = completing("behaviors", "resources")
+complete_type = completing("types")
+complete_person = completing("people")
 Version = Annotated[
     bool, typer.Option("--version", callback=print_version, is_eager=True, help="Show the version and exit.")
 ]
