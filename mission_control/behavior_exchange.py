@@ -65,7 +65,6 @@ class BehaviorExchanges:
     """The implementations of one behavior; one of them is in charge.
 
     Args:
-        first: The first implementation.
         load: Returns the class of a class path.
     """
 

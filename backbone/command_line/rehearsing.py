@@ -20,7 +20,6 @@ def print_dry_run(
     """Print a dry run, write its trace if a file is named, and return the exit code.
 
     Args:
-        description: The mission.
         for_s: Mission seconds; None: the first minute.
         trace: File for the trace, which must be new or empty.
         width: Width of tables; None: the terminal's.

@@ -155,7 +155,6 @@ async def mission_classes(bus: Bus, trouble: Callable[[str], None] = say) -> dic
     A thread imports them, so the event loop of the caller is not blocked.
 
     Args:
-        bus: The bus.
         trouble: Called with a sentence if the classes of the mission's component types cannot be found.
     """
     modules: set[str] = set()
@@ -195,7 +194,6 @@ async def overhearing(
     """Call ``heard`` with key, message and mission time of each selected message.
 
     Args:
-        bus: The bus.
         clock: The mission's clock.
         keys: Patterns of keys; none: all.
         heard: Called in the event loop.

@@ -22,7 +22,6 @@ def preloaded_modules(types: Iterable[ComponentType], placed: Iterable[str] = ()
     among them: its module imports the RCs and commands that it needs, and their edited files would not be read again.
 
     Args:
-        types: Types of the mission.
         placed: Types of the components that are placed.
 
     Example:

@@ -43,7 +43,6 @@ def bars(dry: DryRun, keys: Mapping[str, str]) -> dict[str, str]:
     """Return one bar for each ARC, then for each RC; each column shows the middle of its share of the time.
 
     Args:
-        dry: The dry run.
         keys: ARC → the character it is shown as in the bars of its RCs.
     """
     seen = dry.timetable

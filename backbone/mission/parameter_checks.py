@@ -73,7 +73,6 @@ def check_class_parameters(element: Element, reserved: Collection[str], tables: 
     Args:
         element: A resource, a behavior or the world.
         reserved: Names that other parts of the file set; they are checked elsewhere.
-        tables: The mission.
     """
     kind = element.text("type")
     facts = tables.facts_with_driver(element)

@@ -46,7 +46,6 @@ def live_screen(picture: MissionPicture, events: Iterable[StoryEvent] | None, he
     On a terminal of 120 × 40 a mission of 26 components fits; on a smaller one components are left out first.
 
     Args:
-        picture: The mission.
         events: Newest last; the newest are shown as far as there is room. None: the caller has no events.
         height: Lines of the terminal.
     """

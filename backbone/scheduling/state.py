@@ -154,7 +154,6 @@ class ScheduleState:
         """Add an idle ARC and return its entry.
 
         Args:
-            request: Its request.
             uses: The RCs chosen for it, all of them known.
             place: Names from the root to its owner.
             path: The same nodes with their numbers.

@@ -61,7 +61,6 @@ class Transitions:
         Args:
             decision: The present decision.
             schedule: The plans and the state.
-            ends: The ends of slices.
             trace: Writes the lines.
             rules: Rules of the decisions.
             tolerance_s: Reaction and timer tolerance of this run.

@@ -103,7 +103,6 @@ def sections(draft: Draft, facts: Mapping[str, ClassFacts]) -> dict[str, bytes]:
     """Return the sections of a draft's view for all pages, as JSON by name.
 
     Args:
-        draft: The draft.
         facts: Class path → facts of the class.
     """
     told = {

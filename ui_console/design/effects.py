@@ -87,10 +87,8 @@ def add_behavior(text: bytes, parent: Path, kind: str, name: str, priority: int 
     """Add a node of the behavior tree.
 
     Args:
-        text: The text.
         parent: A behavior; the mission or its ``<behaviors>`` for a root.
         kind: Its type.
-        name: Its name.
         priority: Among its siblings.
     """
     _free(outline(text), "behavior", name)
@@ -168,7 +166,6 @@ def _with_bodies(text: bytes, only: str = "") -> bytes:
     """Return a text in which simulated robots have bodies, in a row near the lower wall, facing the room.
 
     Args:
-        text: The text.
         only: The only robot that gets a body; empty: all robots without a body.
     """
     world = outline(text).first("world")

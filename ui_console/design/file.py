@@ -32,7 +32,6 @@ def save(draft: Draft, path: Path, *, overwrite: bool = False) -> Draft:
     permissions stay.
 
     Args:
-        draft: The draft.
         path: The file; a symbolic link is followed.
         overwrite: True: replace the changes of other programs.
 

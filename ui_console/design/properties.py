@@ -56,7 +56,6 @@ def properties(mission: Element, node: Element, facts: Mapping[str, ClassFacts])
 
     Args:
         mission: The whole file.
-        node: The element.
         facts: Class path → facts of the class.
     """
     rule = vocabulary().get(node.tag)

@@ -99,7 +99,6 @@ class DesignRoom:
     """Serves any number of designers of one file.
 
     Args:
-        draft: The mission.
         kept: The draft file, until the draft is saved.
         look_up: Asks classes for their documentation and parameters, see ``look_up.look_up``.
     """
@@ -269,7 +268,6 @@ class DesignRoom:
         """Show this draft on all pages from now on; each cursor stays on its element.
 
         Args:
-            draft: The draft.
             user: Author of the change.
             chosen: The designer whose cursor moves, and its new element.
         """

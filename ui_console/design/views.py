@@ -187,7 +187,6 @@ def status_view(draft: Draft, revision: int, changed_by: str) -> DraftStatus:
     """Return the state of a draft.
 
     Args:
-        draft: The draft.
         revision: Number of changes.
         changed_by: Author of the last change.
     """
@@ -272,7 +271,6 @@ def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> E
     """Return the view of one element.
 
     Args:
-        draft: The draft.
         path: The element; must exist.
         facts: Class path → facts of the class.
     """
@@ -297,7 +295,6 @@ def offer_view(offer: Offer, class_doc: str = "") -> OfferView:
     """Return an offer without its command.
 
     Args:
-        offer: The offer.
         class_doc: Documentation of its type's class; the first line is shown. Empty: not known.
     """
     return OfferView(offer.label, class_doc.partition("\n")[0] or offer.doc, offer.asks)

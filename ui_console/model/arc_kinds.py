@@ -25,7 +25,6 @@ def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources
 
     Args:
         robot: The robot, or another device that is a body of a kind; empty: any robot.
-        types: Component types of the mission.
         resources: Hardware of the mission.
 
     Raises:

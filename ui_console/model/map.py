@@ -179,7 +179,6 @@ class MapBoard:
         """Return the place on the floor at a point of a robot's picture: x and y in meters.
 
         Args:
-            robot: The robot.
             column_px: As for ``floor_place``.
             row_px: Same.
             size_px: Width and height of the picture.

@@ -116,7 +116,6 @@ class RobotBoard:
         """Return the stop in force on the robot, as a view.
 
         Args:
-            robot: The robot.
             now_s: Mission time.
             user: The person at the screen; empty: no particular person.
             console: Address of that person's console.

@@ -58,7 +58,6 @@ class TeamModel:
     """The state of the mission as known to a console.
 
     Args:
-        mission: Its name.
         lift_remedy: Remedy for a stop, for an operator of this console.
     """
 

@@ -49,7 +49,6 @@ class ConsentAnswers:
         Args:
             asker: Address of the console that asks.
             user: The person at that console.
-            robot: The robot.
             why: The reason, for people.
             topic: To get the robot, or to lift its stop.
 

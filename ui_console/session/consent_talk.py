@@ -54,7 +54,6 @@ class ConsentTalk:
     """The questions that a console asks, and the questions that it answers.
 
     Args:
-        console: The console.
         give_back: Releases this robot for the given reason; returns when that is done.
     """
 

@@ -31,11 +31,7 @@ if TYPE_CHECKING:
 
 
 class Controls:
-    """Sends commands while a robot is held, and shows the outcome of each.
-
-    Args:
-        console: The console.
-    """
+    """Sends commands while a robot is held, and shows the outcome of each."""
 
     def __init__(self, console: AnyObserver) -> None:
         self._console = console

@@ -33,7 +33,6 @@ class GamepadSession(Session):
     """Passes a component's events to the model, and the gamepad's buttons to the component.
 
     Args:
-        model: Model of this console.
         write: Called with each line for the operator.
         find: Finds the gamepad again after it disappeared.
     """
@@ -154,7 +153,6 @@ async def drive_by_gamepad(where: Where, wished: dict[str, object], user: str) -
     """Drive a robot by the gamepad of this machine; return the command's exit code.
 
     Args:
-        where: The mission.
         wished: Parameters of ``Teleoperation``.
         user: The driver, for the record.
 

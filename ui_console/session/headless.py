@@ -26,7 +26,6 @@ async def drive_by_script(where: Where, wished: dict[str, object], user: str, sc
     """Drive a robot by a script; return the command's exit code.
 
     Args:
-        where: The mission.
         wished: Parameters of ``Teleoperation``.
         user: The driver, for the record.
         script: File of JSON lines; ``-``: standard input.

@@ -56,7 +56,6 @@ async def join(where: Where, parameters: dict[str, object] | None = None) -> Joi
     """Return the identity of this process in the mission.
 
     Args:
-        where: The mission.
         parameters: Of the console.
 
     Raises:

@@ -32,7 +32,6 @@ class KindFinder:
     """Asks once for each claim, and keeps the newest answer for a claim of the same kind.
 
     Args:
-        console: The console.
         know: Called with the abilities of the claimed kind; None: not known yet.
     """
 

@@ -66,7 +66,6 @@ class LiftTalk:
         """Lift the stop if every other author agrees; return whether the robot may move.
 
         Args:
-            robot: The robot.
             number: Number of the stop on the screen.
         """
         stop = await self._console.feed.ask_stop(robot)

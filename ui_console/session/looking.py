@@ -57,7 +57,6 @@ async def views_of(bus: Bus, behavior: str) -> Views:
     """Return the views that a behavior has shown so far, with their newest values.
 
     Args:
-        bus: The bus.
         behavior: Its address.
 
     Raises:
@@ -103,10 +102,8 @@ async def keep_looking(
     """Watch a view until cancelled; the behavior may end and restart meanwhile.
 
     Args:
-        bus: The bus.
         clock: The mission's.
         behavior: Its address.
-        view: Name of the view.
         show: Called in the event loop with each picture or value.
         trouble: Called at each renewal for which the behavior does not answer or has not shown the view again.
 

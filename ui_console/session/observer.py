@@ -92,7 +92,6 @@ class Observer(Component[P_co], Generic[P_co]):
         """Record and publish an action of the operator: one event for each action.
 
         Args:
-            action: The action.
             subject: Name of its object.
             detail: For people.
             user: The person who did it; empty: the person at this console.
@@ -129,7 +128,6 @@ class Observer(Component[P_co], Generic[P_co]):
         """Lift a robot's stop if the stop's authors agree; return whether the robot may move.
 
         Args:
-            robot: The robot.
             number: Number of the stop on the screen: a newer stop is not lifted.
             user: The person who lifts it; empty: the person at this console.
             show: Called with the authors' answers; None: this console's screens show them.

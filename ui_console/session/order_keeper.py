@@ -58,7 +58,6 @@ class OrderKeeper:
     """The orders of one console.
 
     Args:
-        console: The console.
         robot: Returns the robot at the stick; empty: none.
         hand_over: Hands this robot from the stick over to its waiting order; does nothing if the stick has not claimed
             it.

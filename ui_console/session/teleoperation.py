@@ -137,7 +137,6 @@ class Teleoperation(OrderVerbs):
         claims the last robot; after a later release, none.
 
         Args:
-            robot: Its name.
             kind: Component type of the ARC; if it differs from the present one, the robot is released and claimed
                 again. Empty: the present type for the same robot, else the type in the console's parameters.
         """

@@ -42,7 +42,6 @@ class ConsoleApp(ConsoleDisplay):
         """Open a dialog; a key held at its opening or closing does not drive until it was released.
 
         Args:
-            dialog: The dialog.
             answered: Called with its answer.
             stale: Message to show instead of the answer if the robot was stopped, freed, granted or lost meanwhile.
         """

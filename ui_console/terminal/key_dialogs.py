@@ -141,7 +141,6 @@ class KeyDialog(Dialog[None]):
     """The messages of one key: fields, a plot of the number under the cursor, and a picture.
 
     Args:
-        row: The key.
         keep_hearing: Calls its argument with the view at each begin, until cancelled.
         now_s: Returns the mission time.
         has_pixels: True if the terminal shows real pixels, and no other picture is on the screen.

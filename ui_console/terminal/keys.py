@@ -108,7 +108,6 @@ def keys_help(profile: Profile, name_of: Callable[[Binding], str]) -> list[str]:
     """Return the action of each key of this profile, a line each, the keys of the emergency stop first.
 
     Args:
-        profile: The profile.
         name_of: Returns the name of a key for people.
     """
     return help_lines([one for one in Binding.make_bindings(KEYS) if has(profile, action_of(one))], name_of)

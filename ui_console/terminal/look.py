@@ -70,7 +70,6 @@ async def look_into(where: Where, name: str, view: str, options: LookOptions) ->
     """List the views of a behavior, or show one of them; return the command's exit code.
 
     Args:
-        where: The mission.
         name: Of the behavior.
         view: Of the view; empty: list them.
         options: How it is shown.

@@ -38,7 +38,6 @@ async def drive_by_hand(where: Where, wished: dict[str, object], looks: Looks) -
     """Drive a robot by keys; return the command's exit code.
 
     Args:
-        where: The mission.
         wished: Parameters of ``Teleoperation``.
         looks: Appearance of the screen.
 

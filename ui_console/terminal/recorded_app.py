@@ -122,7 +122,6 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
     Args:
         session: Shows the recording as a mission.
         play: Plays the recording.
-        line: Its time line.
         has_pixels: True if the terminal shows real pixels.
     """
 

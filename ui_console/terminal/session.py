@@ -35,7 +35,6 @@ class TerminalSession(Session):
 
     Args:
         name: Name of the console.
-        mission: Name of the mission.
         user: The person at it, for people and for the record.
         profile: Appearance of the screen.
         is_bare: True to begin with the picture alone.
@@ -145,7 +144,6 @@ async def on_terminal(screen: EndingApp, end: Callable[[str], None]) -> None:
     """Run the screen; if the terminal goes away, the console ends and releases the robot.
 
     Args:
-        screen: The screen.
         end: Ends the console, with the reason.
     """
 

@@ -151,7 +151,6 @@ class WebHub:
 
         Args:
             who: Operator's name or address, for people.
-            violation: The violation.
         """
         now_s = self.clock.now_s()
         line = f"{who} {violation.line}"

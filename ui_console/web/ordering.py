@@ -9,11 +9,7 @@ from ui_console.web.protocol import OrderRequest, PictureOrder
 
 
 class Ordering:
-    """The taps of one person.
-
-    Args:
-        team: Model of the mission.
-    """
+    """The taps of one person."""
 
     def __init__(self, team: TeamModel) -> None:
         self._team = team

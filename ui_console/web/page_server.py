@@ -101,9 +101,7 @@ class PageServer(Generic[ClientT, IntentT]):
     """Serves a page and its socket.
 
     Args:
-        application: The application.
         authenticator: Knows the tokens.
-        files: The page.
         understand: Decodes the page's messages.
     """
 
@@ -149,7 +147,6 @@ class PageServer(Generic[ClientT, IntentT]):
 
         Args:
             connection: The browser's.
-            request: Its request.
             path: Path relative to this page's path.
         """
         if self._is_over:

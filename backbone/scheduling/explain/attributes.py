@@ -18,7 +18,6 @@ def attributes(arcs: Iterable[ArcEntry], name: str, way: Callable[[tuple[str, ..
     """Return the requests of the ARC or owner of this name, or of the node of this name and its descendants.
 
     Args:
-        arcs: All ARCs.
         name: Name of an ARC, of a decision process (or its address), or of a node of the behavior tree.
         way: Names from the root to an owner → the same nodes with their numbers.
 
