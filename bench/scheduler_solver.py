@@ -300,7 +300,6 @@ def _outcome(of: Fleet, wishes: Sequence[Wish], chosen: Sequence[Choice], second
     )
 
 
-# ---------------------------------------------------------------------- the schedule manager on the same fleet
 def _ours(
     of: Fleet, requests: Sequence[Requested], arrivals_s: Sequence[float], slots: int, within_s: float
 ) -> Outcome | None:

@@ -77,7 +77,6 @@ class Runner:
         await self._clean_up(tried[0])
         return found
 
-    # ------------------------------------------------------------------ before and after
     async def _prepare(self, cell: Cell) -> None:
         """Make all robots turn, and bring the console to the place of the cell."""
         for _ in range(ATTEMPTS - 1):
@@ -131,7 +130,6 @@ class Runner:
         if cell.place.needs == "asked":
             await self._world.asker.leave()
 
-    # ------------------------------------------------------------------ with a link
     async def _stop(self, cell: Cell) -> dict[str, Any]:
         world = self._world
         meant = self._meant(cell)
@@ -178,7 +176,6 @@ class Runner:
     def _mission_s(self, monotonic_s: float) -> float:
         return self._world.clock.now_s() - (time.monotonic() - monotonic_s)
 
-    # ------------------------------------------------------------------ without a link
     async def _stop_without_link(self, gestures: list[Gesture], link: Link) -> list[dict[str, Any]]:
         """Cut the link or freeze the console, give the stops, and return the wheels' and the console's reactions."""
         world, console = self._world, self._console
@@ -243,7 +240,6 @@ def _faults(silent: list[str], moving: list[str], too_many: list[str]) -> str:
     return "; ".join(f"{what}: {', '.join(robots)}" for robots, what in parts if robots)
 
 
-# ---------------------------------------------------------------------- the mission and its consoles
 @asynccontextmanager
 async def console_at_hand(name: str) -> AsyncIterator[TriedConsole]:
     """Run a console whose link can be cut."""

@@ -131,7 +131,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.own_reports = OwnReports(self)
         """Its reports to its parent, or to the console that ordered it."""
 
-    # ------------------------------------------------------------------ hooks with a default of their own
     def need(self) -> ArcNeed | None:
         """Return the ARC of the tree; see ``BehaviorHooks``."""
         return self.parameters.arc
@@ -148,7 +147,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Finish with the same status; see ``BehaviorHooks``."""
         self.finish(status, payload)
 
-    # ------------------------------------------------------------------ for derived classes
     @property
     def path(self) -> Sequence[PathStep]:
         """Names and priorities from the mission's root to this node."""
@@ -205,7 +203,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """True: a console ordered this behavior."""
         return bool(self.parameters.keeper)
 
-    # ------------------------------------------------------------------ in charge, or beside the one in charge
     async def run(self) -> None:
         """Run this class and every class that replaces it; see ``Component.run``."""
         life = super().run()
@@ -257,7 +254,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         assert isinstance(present, Behavior)  # noqa: S101  its exchanges are those of a behavior
         return present
 
-    # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
         """Watch the parent: a behavior, or the ordering console. The first step of a path is not a behavior."""
         self.own_reports.connect(self.parameters.keeper)
@@ -337,7 +333,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         tree = draw([node], rules.remarks() | {self.name: about_it}, in_file_order=rules.in_file_order)
         return BehaviorState(self.name, self.status, self.payload, dict(self.rcs), self.suspended_because, tree)
 
-    # ------------------------------------------------------------------ the tree
     async def _take(self, taken: TakeBranch) -> BranchTaken:
         """Apply the changed branch of the tree; a repeated message waits for the same children to end."""
         if taken.version >= self.tree_version:
@@ -355,7 +350,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             await self._children.rearranged(self._left, anew)
         return BranchTaken(str(self.status) if self.status.is_final else "")
 
-    # ------------------------------------------------------------------ the children and the parent
     def rules_applied(self) -> None:
         """Report the result of the children's rules after an event; see ``ParentOfChildren``."""
         self.children_arranged()

@@ -78,7 +78,6 @@ class BehaviorExchanges:
         self._news = asyncio.Event()
         self._copying: set[asyncio.Task[None]] = set()
 
-    # ------------------------------------------------------------------ the life of the component
     async def run(self, life: Coroutine[object, None, None]) -> None:
         """Run until the implementation in charge has ended; raise the bug that ended it."""
         first = self.present
@@ -107,7 +106,6 @@ class BehaviorExchanges:
                 self.failed(one, bug or RuntimeError("it ended"))
         self._news.set()
 
-    # ------------------------------------------------------------------ questions
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer through the implementation in charge; the other one also gets notices of grants and of the tree."""
         if isinstance(asked.body, SwapClass):
@@ -143,7 +141,6 @@ class BehaviorExchanges:
             return None
         return going.old if going.course.new_works else going.new
 
-    # ------------------------------------------------------------------ what the implementations say
     def failed(self, one: Implementation, bug: BaseException) -> None:
         """Record that an implementation ends because of this bug."""
         going = self._exchange
@@ -173,7 +170,6 @@ class BehaviorExchanges:
             going.course.fail(one.clock.now_s(), "the old one finished before it was ready")
         return bool(one.gate.is_open)
 
-    # ------------------------------------------------------------------ the exchange
     async def swap(self, asked: SwapClass) -> Swapped:
         """Exchange the class; return when the new one has passed its trial, or the old one is back.
 

@@ -99,7 +99,6 @@ class Children:
         self.payload: dict[str, Mapping[str, object]] = {}
         self.suspensions: dict[str, Suspension] = {}
 
-    # ------------------------------------------------------------------ the rules, for derived classes
     def decision(self, name: str) -> Decision:
         """Return the decision on a finished child: by default a failure aborts, a success continues."""
         return Decision.NEXT if self.status[name] is BehaviorStatus.SUCCESS else Decision.ABORT
@@ -122,7 +121,6 @@ class Children:
         """Mission time at which the caller must call ``time_passed``; infinite: never."""
         return math.inf
 
-    # ------------------------------------------------------------------ events
     def begin(self, now_s: float) -> list[Instruction]:
         """Return the orders for the children that run first; none for a behavior without children."""
         self._has_begun = True
@@ -210,7 +208,6 @@ class Children:
         self.suspensions = {}
         return stops
 
-    # ------------------------------------------------------------------ for people
     @property
     def suspended_because(self) -> str:
         """Why no started child is at work; empty: a child is at work, or none is started."""
@@ -247,7 +244,6 @@ class Children:
         given = ", ".join(f"{word} {value_text(value)}" for word, value in payload.items())
         return f"{name} failed ({given})" if given else f"{name} failed"
 
-    # ------------------------------------------------------------------ within
     def _settle(self, now_s: float) -> list[Instruction]:
         """Arrange the children; without children there are no instructions."""
         return self._arrange(now_s) if self._names else []

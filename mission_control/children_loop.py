@@ -60,7 +60,6 @@ class ChildrenLoop:
         self._wakes_at_s, self._woke_at_s = math.inf, -math.inf
         self._latest_s = -math.inf
 
-    # ------------------------------------------------------------------ for the behavior
     def begin(self) -> None:
         """Start the children that run first; end children of an earlier process that are not wanted."""
         self._carry_out(self.rules.begin(self._now_s()))
@@ -119,7 +118,6 @@ class ChildrenLoop:
             self._given_up[name] = Absence(name, self._clock.now_s(), cause, remedy=remedy)
             self._parent.changed()
 
-    # ------------------------------------------------------------------ within
     def _child_left(self, name: str) -> None:
         self._carry_out(self.rules.left(name, self._now_s()))
 

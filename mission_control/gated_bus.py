@@ -95,7 +95,6 @@ class GatedBus:
     def on_unreadable(self, tell: Callable[[str, Refusal], None]) -> None:
         self.bus.on_unreadable = tell
 
-    # ------------------------------------------------------------------ the gate
     @property
     def is_open(self) -> bool:
         """True: the implementation is in charge."""
@@ -113,7 +112,6 @@ class GatedBus:
         """Wait until no command is in progress."""
         await self._quiet.wait()
 
-    # ------------------------------------------------------------------ what acts
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask, if the gate lets the question pass; see ``Bus.ask``."""
         if isinstance(question, Register) and not self.is_first:
@@ -160,7 +158,6 @@ class GatedBus:
         if self.is_open:
             self.bus.pass_on(address, conversation, envelope)
 
-    # ------------------------------------------------------------------ what is heard
     def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to the component while in charge; see ``Bus.serve``."""
         self.answer = answer if self.is_first else partial(_answer_without_exit, answer)
@@ -207,7 +204,6 @@ class GatedBus:
         """Watch the component's link; see ``Bus.watch_link``."""
         return self._keep(self.bus.watch_link(self._mine(listener)))
 
-    # ------------------------------------------------------------------ the rest
     @property
     def mission(self) -> str:
         """Name of the mission."""

@@ -99,7 +99,6 @@ class OwnArc:
         self._claim: dict[str, object] = {}
         self._keeping: asyncio.Task[None] | None = None
 
-    # ------------------------------------------------------------------ claimed, and given back
     async def begin(self, need: ArcNeed, beside: OwnArc | None) -> None:
         """Claim the ARC; if another implementation is in charge, only follow its grants."""
         self.client = ArcClient(self._gate, arc_name(self._gate, need.kind), self, self._hooks.not_now)
@@ -198,7 +197,6 @@ class OwnArc:
         except (Refusal, LinkError) as error:  # the last class's parameters stay until the next claim
             self._owner.story.note(arc.arc, f"its run times were not changed: {error}")
 
-    # ------------------------------------------------------------------ in charge, or beside the one in charge
     def go_on_from(self, other: OwnArc) -> None:
         """Take over the claim and the counts of another implementation."""
         self.claimed = self.claimed or other.claimed
@@ -235,7 +233,6 @@ class OwnArc:
         cancel(keeping)
         self.acting.drop()
 
-    # ------------------------------------------------------------------ grants
     async def arc_resumed(self, notice: Resumed) -> None:
         """Call the hooks; see ``ArcListener``."""
         owner = self._owner

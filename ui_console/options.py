@@ -28,7 +28,6 @@ _seconds = partial(typer.Option, min=0.0, max=LONGEST_WAIT_S)
 _priority = partial(typer.Option, min=LEAST_PRIORITY, max=MOST_PRIORITY)
 RECORDING = "this recording instead: play it, go to any time, ask why; nothing needs to be up."
 
-# ---------------------------------------------------------------------- of several commands
 Mission = Annotated[
     str | None,
     typer.Option("--mission", autocompletion=complete_mission, help="Name of a mission that is up on this machine."),
@@ -40,7 +39,6 @@ User = Annotated[
     str, typer.Option("--user", callback=shown_name, help="Who you are, for the record; default: who is logged in.")
 ]
 
-# ---------------------------------------------------------------------- of attach
 Robot = Annotated[
     str,
     typer.Argument(
@@ -62,7 +60,6 @@ AwayAfter = Annotated[
 VideoOnly = Annotated[bool, typer.Option("--video-only", help="Begin with the picture alone.")]
 Gamepad = Annotated[bool, typer.Option("--gamepad", help="Drive by the gamepad of this machine, too.")]
 
-# ---------------------------------------------------------------------- of monitor and look
 WatchAsJson = Annotated[bool, typer.Option("--json", help="JSON lines instead of a screen.")]
 Once = Annotated[bool, typer.Option("--once", help="All that screens show now, as one JSON object.")]
 WatchedRecording = Annotated[Path | None, typer.Option(help=f"Watch {RECORDING}")]
@@ -74,7 +71,6 @@ Save = Annotated[
 ]
 LooksFor = Annotated[float, _seconds("--for", help="End after so many seconds; 0: at Ctrl-C.")]
 
-# ---------------------------------------------------------------------- of serve
 Host = Annotated[
     str, typer.Option(help="Address to listen at; beyond this machine only if you say so, 0.0.0.0 is all.")
 ]

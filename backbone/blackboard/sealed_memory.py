@@ -52,7 +52,6 @@ class ForeignFolder(Refusal):
     remedy = "Name a folder of your own with mode 0700."
 
 
-# ---------------------------------------------------------------------- memory
 def sealed(value: bytes | memoryview) -> int:
     """Return the descriptor of a new sealed memory file with this content."""
     descriptor = os.memfd_create("scout-value", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
@@ -99,7 +98,6 @@ def _read(descriptor: int, length: int) -> bytes:
         return file.read(length)
 
 
-# ---------------------------------------------------------------------- packets
 def packet_pair() -> tuple[socket.socket, socket.socket]:
     """Return two connected sockets whose packets arrive whole or not at all; neither ever blocks."""
     pair = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -191,7 +189,6 @@ def wait_readable(one: socket.socket | Waits, within_s: float) -> bool:
     return bool(waiting.poll(within_s * 1000))
 
 
-# ---------------------------------------------------------------------- the folder
 @contextlib.contextmanager
 def _place(directory: Path, name: str) -> Iterator[str]:
     """Yield a path of this name that fits a socket, however long the folder's own path is.

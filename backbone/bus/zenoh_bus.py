@@ -143,7 +143,6 @@ class ZenohBus(LifeBus):
         """
         self.copies, self.ways.lines = copies_for(directory), lines_for(directory)
 
-    # ------------------------------------------------------------------ questions
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""
         asked_key = key(self._mission, address, Conversation.ASK)
@@ -229,7 +228,6 @@ class ZenohBus(LifeBus):
         except (OversizedMessage, UnwritableMessage) as refusal:
             return write(self.envelope(Refused.of(refusal)))
 
-    # ------------------------------------------------------------------ publications
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Send the message to all subscribers; see ``Bus.publish``."""
         if not self.closed:
@@ -363,7 +361,6 @@ class ZenohBus(LifeBus):
         heard.declared = self._declare(self.subscribers.declare(expression, heard))
         return heard
 
-    # ------------------------------------------------------------------ leaving
     async def leave(self) -> None:
         """Close the session unless other buses use it; return when its threads have ended."""
         self.empty_inbox()  # pending questions: their requesters get ``NoResponder``

@@ -193,7 +193,6 @@ def _plain(request: RequestAttributes) -> dict[str, object]:
     return {**plain(request), "uses": uses}
 
 
-# ---------------------------------------------------------------------- for people
 def _request_lines(request: RequestAttributes) -> Iterator[str]:
     yield f"{request.arc}: {request.state}, for {request.owner}"
     for attribute in (PRIORITY, PARENT, *RUN_TIMES):

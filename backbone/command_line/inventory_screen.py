@@ -24,7 +24,6 @@ from backbone.wire import plain
 NONE = "–"
 
 
-# ---------------------------------------------------------------------- component types
 def types_table(types: Iterable[TypeCount]) -> RenderableType:
     """Return every type with its limits and the number of its running components."""
     columns = ("type", "subsystem", "may run", "running", "needs", "class")
@@ -100,7 +99,6 @@ def range_text(field: FieldForm) -> str:
     return f"at least {least}" if least else f"at most {most}" if most else ""
 
 
-# ---------------------------------------------------------------------- resources
 @dataclass(frozen=True)
 class ResourceUse:
     """A resource with its place in the schedule, its host and its utilization.

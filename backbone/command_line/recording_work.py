@@ -56,7 +56,6 @@ SHORTEST_RATED_S = 1.0  # chosen: two messages within a millisecond are no thous
 VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
 
 
-# ---------------------------------------------------------------------- making one
 @dataclass(frozen=True)
 class Splitting:
     """Limits after which a recording continues in a further file.
@@ -245,7 +244,6 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
     return ExitCode.DONE
 
 
-# ---------------------------------------------------------------------- looking into one
 async def print_info(path: Path, *, as_json: bool) -> ExitCode:
     """Print facts about the mission, times and numbers."""
     with opened(path) as recording:

@@ -116,7 +116,6 @@ def write_mission(file: Path, text: bytes) -> None:
         raise FileUnusable(f"{file} cannot be written: {error.strerror or error}") from error
 
 
-# ---------------------------------------------------------------------- within
 async def _change(
     where: Where, seen: int | None, change: Callable[[Tree], TreeChange], name: str = "", detail: str = ""
 ) -> ExitCode:

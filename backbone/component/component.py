@@ -130,7 +130,6 @@ class Component(Generic[P_co]):
         self._news = asyncio.Event()
         self._state_published: ComponentState | None = None
 
-    # ------------------------------------------------------------------ hooks
     async def connect(self) -> None:
         """Connect to everything that the component needs.
 
@@ -217,7 +216,6 @@ class Component(Generic[P_co]):
         if self.component_state() != self._state_published:
             self._publish_state()
 
-    # ------------------------------------------------------------------ for derived classes
     @property
     def name(self) -> str:
         """Name of the component, unique in the mission."""
@@ -303,7 +301,6 @@ class Component(Generic[P_co]):
             self.is_robot,
         )
 
-    # ------------------------------------------------------------------ the shell
     async def run(self) -> None:
         """Run the component's whole life cycle; return after an end in good order.
 

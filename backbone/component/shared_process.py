@@ -136,7 +136,6 @@ class SharedProcess:
             of_whom = f"in {self._launch.process}: " if own is None and len(members) > 1 else ""
             one.publish_event(one.name, f"{of_whom}{fault}", LogLevel.WARNING)
 
-    # ------------------------------------------------------------------ questions
     async def _answer(self, asked: Envelope[Message]) -> Message:
         if asked.source != self._launch.requester:
             raise NotItsCreator(f"{asked.source} asked {self.address} for {type(asked.body).__name__}")
@@ -158,7 +157,6 @@ class SharedProcess:
             raise NotAMember(f"no life {life} was begun in {self.address}", life=life)
         return member
 
-    # ------------------------------------------------------------------ members
     def _admit(self, launch: Launch, life: int) -> None:
         if life in self._members:  # the answer was lost
             return

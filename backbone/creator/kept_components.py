@@ -68,7 +68,6 @@ class KeptComponents(dict[str, Kept]):
         kept = self.get(name)
         return kept.launch if kept is not None else None
 
-    # ------------------------------------------------------------------ waiting callers
     async def wait_ready(self, name: str) -> int:
         """Return the pid of a starting component when it is ready.
 

@@ -197,7 +197,6 @@ def _dry_run(description: MissionDescription, for_s: float, progress: Progress) 
     return replace(found, last=_dry_run(at_the_end, min(for_s, last.within_s), progress), last_name=last.behavior.name)
 
 
-# ---------------------------------------------------------------------- placement
 def placements(description: MissionDescription) -> list[Placed]:
     """Return the host of each component, in the order of their starts: hardware, then the tree with its ARCs.
 
@@ -242,7 +241,6 @@ def _place(
     return Placed(name, component_type.name, choice.host, choice.reasons)
 
 
-# ---------------------------------------------------------------------- schedule
 @dataclass(frozen=True, slots=True)
 class _BehaviorClaim:
     """A behavior's claim, or why the behavior cannot claim."""

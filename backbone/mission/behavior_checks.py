@@ -133,7 +133,6 @@ def _check_runtime(behavior: Element, arc: Element, report: Report) -> None:
         )
 
 
-# ---------------------------------------------------------------------- wishes and needs of an ARC
 def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
     """Report wishes that no resource can fulfil; return whether all can be fulfilled."""
     kind, needs = arc.text("kind"), tables.needs(arc.text("kind"))

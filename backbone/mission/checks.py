@@ -70,7 +70,6 @@ def check(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> N
     check_processes(tables, _reserved(tables), report)
 
 
-# ---------------------------------------------------------------------- hosts and core services
 def _check_hosts(tables: Tables, report: Report) -> None:
     hosts = section(tables.root, "hosts")
     check_unique(hosts, "name", "host", report)
@@ -137,7 +136,6 @@ def _main_host(tables: Tables) -> str:
     return next(iter(tables.hosts), "…")
 
 
-# ---------------------------------------------------------------------- types
 def _check_types(tables: Tables, report: Report) -> None:
     types = section(tables.root, "types")
     check_unique(types, "name", "type", report)
@@ -192,7 +190,6 @@ def _check_type_tags(component_type: Element, tables: Tables, report: Report) ->
         )
 
 
-# ---------------------------------------------------------------------- resources
 def _check_resources(tables: Tables, report: Report) -> None:
     resources = section(tables.root, "resources")
     of_one: dict[str, Element] = {}
@@ -314,7 +311,6 @@ def _check_network_id(resource: Element, ids: dict[int, Element], report: Report
         return
 
 
-# ---------------------------------------------------------------------- names
 def _check_component_names(tables: Tables, report: Report) -> None:
     """Report a name that two components would have: RCs, world, units, behaviors, their ARCs, core services."""
     reserved = _reserved(tables)

@@ -173,7 +173,6 @@ def _arc(declared: ArcElement) -> ArcWish:
     )
 
 
-# ---------------------------------------------------------------------- the world
 def _world(
     world: WorldElement,
     resources: Sequence[ResourceElement],

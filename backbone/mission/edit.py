@@ -58,7 +58,6 @@ class NewElement:
     children: Sequence[NewElement] = ()
 
 
-# ---------------------------------------------------------------------- changes
 def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> bytes:
     """Return the text with another value; its quotes stay, and a new attribute gets its place in the declared order.
 
@@ -190,7 +189,6 @@ def move(data: bytes, path: Path, parent: Path, at: int) -> bytes:
     return _insert(cut, after, min(max(at, 0), len(after.children)), text)
 
 
-# ---------------------------------------------------------------------- limits of what can be written
 def _may_have(tag: str, name: str) -> None:
     rule = vocabulary().get(tag)
     if rule is None or name not in rule.attributes:
@@ -243,7 +241,6 @@ def _readable(data: bytes) -> bytes:
     return data
 
 
-# ---------------------------------------------------------------------- layout
 def _written(new: NewElement, indent: str) -> bytes:
     """Return the element as lines, without the first indentation and the last line end."""
     order = {name: number for number, name in enumerate(vocabulary()[new.tag].attributes)}

@@ -199,7 +199,6 @@ def host_tags_lacking(host: Element, component_type: Element) -> list[str]:
     return [tag for tag in component_type.words("tags") if tag not in host.words("tags")]
 
 
-# ---------------------------------------------------------------------- common to all checks
 def is_known(element: Element, attribute: str, what: str, known: Collection[str], report: Report) -> bool:
     """Return whether the attribute names something that exists; report a legal name that does not."""
     name = element.text(attribute)

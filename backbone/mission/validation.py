@@ -82,7 +82,6 @@ def fill_defaults(root: Element) -> None:
                 element.attributes[name] = Attribute(rule.default, element.place, is_written=False)
 
 
-# ---------------------------------------------------------------------- undeclared parts
 def _repair(element: Element, report: Report) -> None:
     rule = vocabulary()[element.tag]
     _repair_attributes(element, rule, report)
@@ -134,7 +133,6 @@ def _remark(meant: str) -> str:
     return f" (did you mean {meant!r}?)" if meant else ""
 
 
-# ---------------------------------------------------------------------- checks by pydantic
 def _values(element: Element) -> dict[str, object]:
     """Return an element in the form that the declared classes read: attributes and children by their names."""
     values: dict[str, object] = {name: attribute.value for name, attribute in element.attributes.items()}

@@ -100,7 +100,6 @@ class Registry:
         self._stops: dict[str, StandingStop | None] = {**(stops or {})}
         self._otherwise = otherwise
 
-    # ------------------------------------------------------------------ events
     def registered(self, newcomer: ComponentState, now_s: float) -> None:
         """Register the newcomer under its name. Idempotent for the same state.
 
@@ -176,7 +175,6 @@ class Registry:
         ):
             self._record(entry, state)
 
-    # ------------------------------------------------------------------ questions
     def stop_of(self, name: str) -> StandingStop | None:
         """Return the emergency stop in force on the component of this name, or on its last one."""
         return self._stops.get(name, self._otherwise)
@@ -227,7 +225,6 @@ class Registry:
     def _is_complete(self, now_s: float) -> bool:
         return now_s >= self._complete_from_s and not self._introducing
 
-    # ------------------------------------------------------------------
     def _record(self, entry: _Entry, state: ComponentState) -> None:
         entry.state, name = state, component_of(state.address)
         if state.stop is None and self._otherwise is None:

@@ -74,7 +74,6 @@ class MissionPicture:
         for component in self.components.values():
             self.people.heard(component)
 
-    # ------------------------------------------------------------------ messages in
     def take(self, said: Said, source: str = "") -> None:
         """Update the picture with a message.
 
@@ -112,7 +111,6 @@ class MissionPicture:
         if not is_over and (known is None or not is_older(component, known)):
             self.components[component.address] = component
 
-    # ------------------------------------------------------------------ views out
     @property
     def health(self) -> MissionHealth:
         """The mission's health, with absences."""

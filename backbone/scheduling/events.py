@@ -17,7 +17,6 @@ from backbone.scheduling.trace import Line
 from backbone.wire import Message
 
 
-# ---------------------------------------------------------------------- events
 class RcKnown(Message, frozen=True):
     """An RC exists; repeated after its restart.
 
@@ -201,7 +200,6 @@ Event = (
 )
 
 
-# ---------------------------------------------------------------------- instructions
 @dataclass(frozen=True, slots=True)
 class ConnectArc:
     """Connect all these RCs to the ARC, let them settle, open its gate; report ``Opened`` or ``OpenFailed``.

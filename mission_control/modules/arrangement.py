@@ -181,7 +181,6 @@ def _no_rounds(graph: Graph, units: Sequence[UnitOrder]) -> Iterator[WiringFault
             yield NoRounds(tuple(one.name for one in unit.modules), "", detail, 'Write frequency-hz="…"')
 
 
-# ---------------------------------------------------------------------- for mission files
 def judged(question: UnitsQuestion) -> Arranged:
     """Return the parameters of all units, or all faults."""
     units: list[UnitOrder] = []

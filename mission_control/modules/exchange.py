@@ -77,7 +77,6 @@ class Exchange(ExchangeCourse):
             finally:
                 self._busy.release()
 
-    # ------------------------------------------------------------------ rounds
     def _warm(self, now_s: float, old: Turn, new: Turn) -> Turned:
         kept = old()
         turned = self.tried(now_s, new)

@@ -88,7 +88,6 @@ def _fed(port: Port) -> str:
     return f"{'required' if port.is_required else 'optional'} {'latest' if port.is_latest else 'fresh'}"
 
 
-# ---------------------------------------------------------------------- values
 def kinds_made(module: Module | type[Module], member: Member) -> dict[str, object]:
     """Return key → class of the values that a module makes."""
     kinds = kinds_of_ports(module.Outputs)

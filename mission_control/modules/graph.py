@@ -67,7 +67,6 @@ class Connection:
     consumer: str
 
 
-# ---------------------------------------------------------------------- faults
 @dataclass(frozen=True, slots=True)
 class WiringFault:
     """A fault of the graph.
@@ -125,7 +124,6 @@ class GraphRefused(Refusal):
         self.faults = tuple(faults)
 
 
-# ---------------------------------------------------------------------- the graph
 class Graph:
     """A checked graph.
 
@@ -257,7 +255,6 @@ def _of_inputs(
             )
 
 
-# ---------------------------------------------------------------------- order and cycles
 def _before(members: Sequence[Member], producers: Mapping[str, str]) -> dict[str, set[str]]:
     """Return module → the modules among these that must run before it."""
     names = {member.name for member in members}

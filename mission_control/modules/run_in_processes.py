@@ -145,7 +145,6 @@ def _order(name: str, module: Module) -> ModuleOrder:
     return ModuleOrder(name, f"{kind.__module__}:{kind.__qualname__}", msgspec.to_builtins(module.parameters))
 
 
-# ---------------------------------------------------------------------- in the script
 def _forked(
     name: str, parameters: UnitParameters, clock: MissionClock, folder: str, others: Sequence[_Child]
 ) -> _Child:
@@ -232,7 +231,6 @@ async def _statistics(hub: ZenohBus, launch: Launch) -> dict[str, float]:
     return (await hub.ask(launch.address, AskStatistics(), Statistics, within_s=ANSWERS_WITHIN_S)).values
 
 
-# ---------------------------------------------------------------------- in the process of a module
 def _become(launch: Launch, connection: Connection, inherited: Sequence[Connection]) -> None:
     """Run the unit when the endpoint arrives."""
     for one in inherited:  # otherwise the end of the script would not close them

@@ -115,7 +115,6 @@ class UnitThread:
             if self._pool is not None:
                 self._pool.shutdown(wait=False, cancel_futures=True)
 
-    # ------------------------------------------------------------------ in the thread
     def _live(self) -> None:
         while not self._is_over:
             with self._news:
@@ -166,7 +165,6 @@ class UnitThread:
             with contextlib.suppress(RuntimeError):  # the component and its loop have ended
                 self._loop.call_soon_threadsafe(self._hand_next_on)
 
-    # ------------------------------------------------------------------ in the event loop
     def _hand_next_on(self) -> None:
         """Pass the outputs of one round on; the next round follows in a separate step, so that listeners get both."""
         with self._news:

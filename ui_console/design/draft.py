@@ -116,7 +116,6 @@ class Draft:
             return None
         return dry_run(self.description)
 
-    # ------------------------------------------------------------------ steps
     def do(self, command: DesignCommand) -> Draft:
         """Return the draft after a command; if it changes nothing, return the same draft.
 

@@ -264,7 +264,6 @@ def write_parameter(text: bytes, path: Path, name: str, value: str | None) -> Te
     return TextState(edit.set_attribute(text, found.path, "value", value), path)
 
 
-# ---------------------------------------------------------------------- names
 def _free(root: Element, tag: str, name: str) -> None:
     """Refuse a name that is illegal, or that another element of the kind has.
 

@@ -117,7 +117,6 @@ class DesignRoom:
         self._keeping: asyncio.Task[None] | None = None
         self._changed_by = ""
 
-    # ------------------------------------------------------------------ designers come and go
     def enter(self, welcome: Welcome) -> Designer:
         """Return a new designer, whose page gets the whole view."""
         client = Designer(welcome)
@@ -143,7 +142,6 @@ class DesignRoom:
         for client in self.clients:
             client.answer(NoticeAnswer(f"{who} {violation.line}", violation.remedy))
 
-    # ------------------------------------------------------------------ messages of pages
     async def obey(self, client: Designer, intent: DesignIntent) -> None:
         """Carry out a designer's messages one after the other; send refusals to that designer."""
         is_change = isinstance(intent, Change | SaveFile | TakeFile)
@@ -222,7 +220,6 @@ class DesignRoom:
             )
         await self._learn([entry.class_path])
 
-    # ------------------------------------------------------------------ tasks beside the pages
     async def prepare(self) -> None:
         """Create the sections of the first view."""
         async with self._turn:
@@ -263,7 +260,6 @@ class DesignRoom:
         for client in self.clients:
             self._send(client)
 
-    # ------------------------------------------------------------------ messages to pages
     async def _show(self, draft: Draft, user: str, chosen: tuple[Designer, Path] | None = None) -> None:
         """Show this draft on all pages from now on; each cursor stays on its element.
 

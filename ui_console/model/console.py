@@ -84,7 +84,6 @@ class ConsoleModel:
         self.alarms = alarms or AlarmBook(beside=self.team.alarms)
         """Alarms of this console alone."""
 
-    # ------------------------------------------------------------------ events in
     def apply(self, event: events.ConsoleEvent) -> None:
         """Apply the event; an event of the whole mission goes to ``team``."""
         match event:
@@ -129,7 +128,6 @@ class ConsoleModel:
         """Record that this console's user knows of the lost robot, and does not want it back."""
         self._went = None
 
-    # ------------------------------------------------------------------ views out
     @property
     def reach(self) -> Reach | None:
         """Largest speeds of the ARC's body; ``SLOW`` while they are not known; None: the body cannot move."""
@@ -282,7 +280,6 @@ class ConsoleModel:
             return f"waiting for {wanted}: {self._why_lost(self.lost)}"
         return f"waiting for {wanted}"
 
-    # ------------------------------------------------------------------ within
     def _apply_own(self, event: events.OwnEvent) -> None:
         alarms = self.alarms
         match event:

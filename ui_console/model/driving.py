@@ -202,7 +202,6 @@ class DeadMan:
         self._must_halt = False
         self._keys, self._stick, self._once = ControlGrip(), ControlGrip(), ControlGrip()
 
-    # ------------------------------------------------------------------ controls
     def press(self, drive: Motion, now_s: float, lasts_s: float | None = None) -> bool:
         """Record that a key is down, for the first time or repeated; return whether the press counts.
 
@@ -253,7 +252,6 @@ class DeadMan:
         """Return whether a held control must be released before it moves anything."""
         return any(grip.is_held_back(now_s) for grip in self._grips)
 
-    # ------------------------------------------------------------------ commands to send
     def due(self, now_s: float) -> Motion | HaltWish | None:
         """Return the command to send now, if one is due; the returned command counts as sent."""
         if self._held is not None and now_s >= self._until_s:

@@ -36,7 +36,6 @@ class Event:
     at_s: float
 
 
-# ---------------------------------------------------------------------- of its own robot
 @dataclass(frozen=True, slots=True)
 class Asked(Event):
     """A robot was requested."""
@@ -232,7 +231,6 @@ class OrderChanged(Event):
     given: GivenOrder
 
 
-# ---------------------------------------------------------------------- of the whole mission
 Said = (
     Schedule
     | Leases

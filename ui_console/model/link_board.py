@@ -37,7 +37,6 @@ class LinkBoard:
         self._link = LinkHeard(0.0, True)
         self._link_heard_s = 0.0
 
-    # ------------------------------------------------------------------ messages in
     def take_link(self, link: LinkHeard) -> None:
         """Record the state of the link, or a measurement of it."""
         if link.is_up:
@@ -79,7 +78,6 @@ class LinkBoard:
         """Check whether the link is silent."""
         self._alarms.hold(self.down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
 
-    # ------------------------------------------------------------------ views out
     def radio_line(self, arc: str) -> str:
         """Return a line about an ARC's packets on its radio; empty: no radio reported on the ARC."""
         counts = [(radio, int(count)) for (radio, of), count in sorted(self._overruns.items()) if of == arc]

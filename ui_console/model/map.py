@@ -120,7 +120,6 @@ class MapBoard:
         self._tracks: dict[str, _Track] = {}
         self._types: dict[str, ComponentType] = {}
 
-    # ------------------------------------------------------------------ messages in
     def take_plan(self, plan: FloorPlan) -> None:
         """Record the plan of the floor; the newest plan is used."""
         self._told = plan
@@ -142,7 +141,6 @@ class MapBoard:
         """Record the component types of the mission, which declare the robots' cameras."""
         self._types = {one.component_type.name: one.component_type for one in types.types}
 
-    # ------------------------------------------------------------------ views out
     @property
     def floor(self) -> FloorPlan | None:
         """The plan of the floor; None: no localizer sent one, and no body has a place.
@@ -201,7 +199,6 @@ class MapBoard:
             raise NoFloorThere(f"the floor there, {x_m:.1f} {y_m:.1f} m, would be outside of the room")
         return x_m, y_m
 
-    # ------------------------------------------------------------------ within
     def _lay_floor(self) -> None:
         """Update the floor from the localizer's plan; without an extent, the floor covers all places so far."""
         told, (far_x_m, far_y_m) = self._told or FloorPlan(0.0, 0.0), self._far_m

@@ -78,7 +78,6 @@ class OrderBook:
         self.last = 0
         """Number of the newest order; 0: none was given."""
 
-    # ------------------------------------------------------------------ what is
     @property
     def orders(self) -> Mapping[str, GivenOrder]:
         """Robot → its newest order whose behavior still has it; a finished one keeps it for the operator."""
@@ -100,7 +99,6 @@ class OrderBook:
         given = self.orders.get(robot)
         return given is not None and not given.state.is_final
 
-    # ------------------------------------------------------------------ events of the operator
     def give(self, order: Order) -> list[Instruction]:
         """Handle a new order: the robot's present order ends, but keeps the robot until the new one has it."""
         self.last += 1
@@ -132,7 +130,6 @@ class OrderBook:
         """Handle the return of the operator."""
         self._is_away = False
 
-    # ------------------------------------------------------------------ events of the behaviors
     def based_on(self, number: int, by: str) -> list[Instruction]:
         """Record the source of the positions for this order."""
         given = self._given.get(number)
@@ -196,7 +193,6 @@ class OrderBook:
         self._removing.discard(number)
         self._given.pop(number, None)
 
-    # ------------------------------------------------------------------ within
     def _of(self, robot: str) -> list[GivenOrder]:
         return [one for number, one in self._given.items() if one.order.robot == robot and number not in self._removing]
 

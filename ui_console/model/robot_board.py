@@ -43,7 +43,6 @@ class RobotBoard:
         self._readings: dict[str, Readings] = {}
         self._reports: dict[str, list[FieldForm]] = {}
 
-    # ------------------------------------------------------------------ messages in
     def take_schedule(self, schedule: Schedule) -> None:
         """Record the holders: a new hold counts as renewed when it began."""
         self._renewed = {
@@ -92,7 +91,6 @@ class RobotBoard:
         kinds = (one.component_type for one in types.types)
         self._reports = {kind.name: kind.abilities.reports for kind in kinds if kind.abilities.reports}
 
-    # ------------------------------------------------------------------ views out
     def views(self, now_s: float) -> list[RobotView]:
         """Return the robots, sorted by name; none is marked as an operator's own, and none has pictures."""
         if self._picture.schedule is None:

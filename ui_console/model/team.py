@@ -87,7 +87,6 @@ class TeamModel:
         """The newest schedule."""
         return self.picture.schedule
 
-    # ------------------------------------------------------------------ events in
     def apply(self, event: TeamEvent) -> None:
         """Apply the event."""
         if isinstance(event, LinkHeard):
@@ -160,7 +159,6 @@ class TeamModel:
             line = f"{who} waits for {waits_s:.0f} s and no end is in sight: {because(request, self.people)}"
             self.alarms.hold(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
 
-    # ------------------------------------------------------------------ views out
     def person(self, console_name: str) -> str:
         """Return the name of the person at a console, even if the console has left; return any other name unchanged.
 
@@ -226,7 +224,6 @@ class TeamModel:
         views = [view for book in (self.alarms, *own) for view in book.views()]
         return [self._located(view) for view in one_line_for_one_cause(views, self._explained_by)]
 
-    # ------------------------------------------------------------------ the schedule
     def _take_schedule(self, schedule: Schedule) -> None:
         before = {request.arc for request in self.schedule.requests} if self.schedule else set()
         self.picture.take(schedule)
@@ -253,7 +250,6 @@ class TeamModel:
             would_change=named(request.would_change),
         )
 
-    # ------------------------------------------------------------------ components
     def _shown(self) -> list[ComponentState]:
         """Return the running components, and the lost behaviors, whose place is kept until they are back."""
         behaviors = {at: one for at, (_, one) in self._lost.items() if _is_in(Subsystem.MISSION_CONTROL, at)}
@@ -316,7 +312,6 @@ class TeamModel:
         for key in [key for key in self._parameters if key[0] == name]:
             del self._parameters[key]
 
-    # ------------------------------------------------------------------ subjects of alarms
     def _explained_by(self, subject: str) -> frozenset[str]:
         return self._needs.of(subject, self.schedule)
 
@@ -344,7 +339,6 @@ class TeamModel:
         line = f"{fell.name} fell: {fell.how}; {again}{said}"
         self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, key=f"fell:{fell.name}", severity=severity)
 
-    # ------------------------------------------------------------------ changes of parameters
     def _take_change(self, change: SetParameter, address: str, at_s: float) -> None:
         """Record the author of a parameter's change; the new value arrives right afterwards, with the same time."""
         key = (component_of(address), change.name)

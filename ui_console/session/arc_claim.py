@@ -86,7 +86,6 @@ class ArcClaim:
         """True while the ARC is kept without a grant."""
         return self._keeping is not None and not self.is_held
 
-    # ------------------------------------------------------------------ claim
     def take(self) -> None:
         """Claim the robot unless it is claimed; if releases are in progress, claim it right after the last one."""
         if self._releases:
@@ -161,7 +160,6 @@ class ArcClaim:
         self._console.show(events.CommandRefused(now_s, code_of(refusal), refusal.detail, refusal.remedy, True))
         self._decided.set()
 
-    # ------------------------------------------------------------------ release
     async def give_back(
         self, reason: str, *, for_good: bool = False, wanted: bool = True, to_order: bool = False
     ) -> None:
@@ -232,7 +230,6 @@ class ArcClaim:
         console.report("holds no robot")
         console.show(events.GivenBack(console.clock.now_s(), reason, confirmed, wanted))
 
-    # ------------------------------------------------------------------ the ARC
     async def handle(self, notice: ArcNotice) -> Message:
         """Answer a notice of the ARC.
 

@@ -62,7 +62,6 @@ class ConsentTalk:
         console.answers.yield_robot = self._begin_to_yield
         self._unanswered = 0
 
-    # ------------------------------------------------------------------ the side that waits
     def begin_ask(self, claim: Claim | None, why: str = "") -> None:
         """Ask the consoles that hold the robot, and show their answers; if such a question is open, do nothing.
 
@@ -132,7 +131,6 @@ class ConsentTalk:
         now_s = console.clock.now_s()
         console.show(ConsentHeard(now_s, question.robot, consent.user, consent.is_given, consent.reason))
 
-    # ------------------------------------------------------------------ the side that holds
     async def seek(self, asker: str, asked: AskConsent, at_once: Consent | None) -> Consent:
         """Ask the operator of this console for a decision; without an answer in time it is no.
 

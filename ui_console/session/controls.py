@@ -43,7 +43,6 @@ class Controls:
         self.abilities: ArcAbilities | None = None
         """Abilities of the ARC; None: not known."""
 
-    # ------------------------------------------------------------------ the robot
     def connect(self, arc: ArcClient) -> None:
         """Send commands to this ARC from now on, as long as it is granted."""
         self._arc, self._is_on = arc, True
@@ -69,7 +68,6 @@ class Controls:
         self._pressed.set()
         self._console.show(MomentBegan(self._console.clock.now_s()))
 
-    # ------------------------------------------------------------------ the operator's controls
     def hold(self, drive: Motion, lasts_s: float | None = None) -> bool:
         """Record that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
@@ -162,7 +160,6 @@ class Controls:
             case HaltWish():
                 return None if self.abilities.reach is None else arc.move(0.0)
 
-    # ------------------------------------------------------------------ the record
     def record_drive_end(self, robot: str, why: str = "") -> None:
         """Record the end of the present drive, if there is one."""
         took_s = self._span.ends(self._console.clock.now_s())

@@ -91,7 +91,6 @@ class ConsoleFeed:
         self.unanswered = UnansweredStops(bus, clock, self._hear, self._showing_failure)
         """Stops that no robot answered, to be run by its owner."""
 
-    # ------------------------------------------------------------------ listening
     def listen(self) -> None:
         """Subscribe; once, before ``run``."""
         bus = self._bus
@@ -114,7 +113,6 @@ class ConsoleFeed:
             group.create_task(self._feel_link(), name="feed:link")
             group.create_task(self._feel_pulse(), name="feed:pulse")
 
-    # ------------------------------------------------------------------ verbs of an operator
     async def stop_robots(self, robots: Iterable[str], reason: str = "", user: str = "") -> list[str]:
         """Stop these robots, all at once, regardless of their holders; return the robots without confirmation.
 
@@ -194,7 +192,6 @@ class ConsoleFeed:
             return True
         return False
 
-    # ------------------------------------------------------------------ within
     def _showing_failure(self) -> _Answered:
         """Show a refusal or a missing answer that ends the block."""
         return _Answered(lambda error: self._show(failed(self._clock.now_s(), error)))

@@ -31,7 +31,6 @@ Classes = Mapping[str, type[Message]]
 ShowRows = Callable[[list[KeyRow]], None]
 
 
-# ---------------------------------------------------------------------- live
 class HeardKeys:
     """Counts overheard messages by their headers, so it needs no message classes.
 
@@ -91,7 +90,6 @@ async def keep_hearing(bus: Bus, clock: Clock, classes: Classes, row: KeyRow, vi
         await asyncio.Event().wait()
 
 
-# ---------------------------------------------------------------------- recorded
 async def keep_listing_recorded(recording: Recording, playback: Playback, show: ShowRows) -> None:
     """Call ``show`` each second with all keys of a recording, until cancelled; rates are per mission second.
 

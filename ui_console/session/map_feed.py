@@ -79,7 +79,6 @@ class MapFeed:
             await self._look()
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
 
-    # ------------------------------------------------------------------ within
     async def _look(self) -> None:
         robots = sorted(component_of(one.address) for one in self._there.values() if one.is_robot)
         known_types = [one for one in (self._there.get(COMPONENT_DATABASE),) if one is not None]

@@ -87,7 +87,6 @@ class Observer(Component[P_co], Generic[P_co]):
         self._was_cut = False
         self._answers_of = answers_of or (lambda user: self.answers if user in (self.user, self.address) else None)
 
-    # ------------------------------------------------------------------ the operator's actions
     def acted(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
         """Record and publish an action of the operator: one event for each action.
 
@@ -100,7 +99,6 @@ class Observer(Component[P_co], Generic[P_co]):
         self.story.note(subject, act.sentence, act.event(self.address).level, act.user)
         self.bus.publish(self.address, Conversation.OPERATORS, act)
 
-    # ------------------------------------------------------------------ verbs that need no grant
     async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:
         """Stop a robot, regardless of its holder; return whether the stop is confirmed.
 
@@ -154,7 +152,6 @@ class Observer(Component[P_co], Generic[P_co]):
         """Return the explanation of the state of this robot, ARC, behavior, console or component, for people."""
         return await self.feed.why(name)
 
-    # ------------------------------------------------------------------ the component's hooks
     def person(self) -> str:
         """Return the person at this console; empty for a console that serves other people and has its own name."""
         return self.user if self.user != self.name else ""

@@ -78,7 +78,6 @@ class OrderKeeper:
         self._removals: dict[int, asyncio.Task[None]] = {}
         self._changed = asyncio.Event()
 
-    # ------------------------------------------------------------------ the operator
     @property
     def orders(self) -> Mapping[str, GivenOrder]:
         """Robot → its order; a finished order still keeps the robot for the operator."""
@@ -133,7 +132,6 @@ class OrderKeeper:
         """Record that the operator is there."""
         self._book.back()
 
-    # ------------------------------------------------------------------ the behaviors
     def reported(self, source: str, report: ChildReport) -> ReportNoted:
         """Note the report of a behavior.
 
@@ -166,7 +164,6 @@ class OrderKeeper:
         except TimeoutError:
             log.warning("%s leaves before its orders have ended", self._console.name)
 
-    # ------------------------------------------------------------------ within
     def _carry_out(self, steps: Sequence[Instruction]) -> None:
         start_task = self._console.start_task
         for step in steps:
@@ -209,7 +206,6 @@ class OrderKeeper:
     async def _pass_on(self, order: Order) -> None:
         await self._hand_over(order.robot, order.sentence)
 
-    # ------------------------------------------------------------------ the life of a behavior
     async def _carry(self, number: int) -> None:
         """Start the behavior of an order, and wait until it is gone; it reports meanwhile."""
         console = self._console

@@ -134,7 +134,6 @@ class RecordedPlay(Generic[Console]):
         """Wait until a person has jumped to another time."""
         await self._is_elsewhere.wait()
 
-    # ------------------------------------------------------------------ verbs of a person
     def play(self, speed: float) -> None:
         """Play; at the end, begin again."""
         if self.playback.now_s() >= self.playback.end_s:
@@ -156,7 +155,6 @@ class RecordedPlay(Generic[Console]):
         self.playback.pause()
         self.go_to(self.playback.end_s if following is None else following.at_s)
 
-    # ------------------------------------------------------------------ its life
     def end(self, _reason: str) -> None:
         """Make ``run`` return."""
         self._ended.set()

@@ -97,7 +97,6 @@ class Teleoperation(OrderVerbs):
         """Set once the first claim or order is given, so that verbs are later than it."""
         self._switching = asyncio.Lock()
 
-    # ------------------------------------------------------------------ verbs
     @property
     def is_held(self) -> bool:
         """True while commands pass."""
@@ -251,7 +250,6 @@ class Teleoperation(OrderVerbs):
     def _robot(self) -> str:
         return self.parameters.robot or self._claim.holding
 
-    # ------------------------------------------------------------------ consent
     def begin_ask_consent(self, why: str = "") -> None:
         """Ask the consoles that hold the robot, and show their answers; if such a question is open, do nothing."""
         robot, is_waiting = self.parameters.robot, self._claim.is_asking and not self.is_held
@@ -279,7 +277,6 @@ class Teleoperation(OrderVerbs):
         else:
             await self.give_back(reason)
 
-    # ------------------------------------------------------------------ the component's hooks
     async def serve(self) -> None:
         """Claim, then receive events; a separate task sends the commands of held keys."""
         self.sign_in(f"to drive {self.parameters.robot or ANY_ROBOT}, with priority {self.parameters.priority}")
@@ -328,7 +325,6 @@ class Teleoperation(OrderVerbs):
     def _waits_for(self) -> tuple[str, float] | None:
         return (self.parameters.robot, self._claim.asked_s) if self._claim.is_waiting else None
 
-    # ------------------------------------------------------------------ away, and single commands
     async def _go_away(self) -> None:
         """Release the robot for useful work while its operator is away."""
         self.leave()

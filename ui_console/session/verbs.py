@@ -87,7 +87,6 @@ class Session:
         """Give the robot back."""
         self._with_robot(Teleoperation.begin_release)
 
-    # ------------------------------------------------------------------ orders
     @property
     def orders(self) -> Mapping[str, GivenOrder]:
         """Robot → its order; see ``Teleoperation.orders``."""
@@ -214,7 +213,6 @@ class Session:
         console = self._ready_console()
         await keep_looking(console.bus, console.clock, behavior, view, show, trouble=trouble)
 
-    # ------------------------------------------------------------------ what is said
     async def keep_listing(self, show: Callable[[list[KeyRow]], None]) -> None:
         """Call ``show`` each second with the keys that have messages, until cancelled."""
         console = self._ready_console()

@@ -65,7 +65,6 @@ class ConsoleApp(ConsoleDisplay):
         """Run this in a task, so that keys continue to work."""
         await act()
 
-    # ------------------------------------------------------------------ keys that drive
     def on_key(self, _event: Key) -> None:
         """Record that the operator is there."""
         self._session.touch()
@@ -173,7 +172,6 @@ class ConsoleApp(ConsoleDisplay):
         if self.drives:
             self._session.touch()
 
-    # ------------------------------------------------------------------ emergency stop
     def action_stop_robot(self) -> None:
         """Stop this robot, regardless of its holder."""
         robot = self._robot_meant()
@@ -218,7 +216,6 @@ class ConsoleApp(ConsoleDisplay):
             self.notify(f"not confirmed: {', '.join(unsure)}", severity="error")
         self.redraw()
 
-    # ------------------------------------------------------------------ which robot
     def action_choose_robot(self, number: int) -> None:
         """Take the robot of this number in place of the one held."""
         robots = self._view.robots if self._view is not None else []
@@ -238,7 +235,6 @@ class ConsoleApp(ConsoleDisplay):
             lambda robot: self._begin(partial(self._session.switch, robot)),
         )
 
-    # ------------------------------------------------------------------ tables
     def action_panel(self, steps: int) -> None:
         """Go to the next table."""
         names = list(PanelName)

@@ -119,7 +119,6 @@ class ConsoleDisplay(EndingApp):
         """Whether this console may drive."""
         return self.profile is not Profile.MONITOR
 
-    # ------------------------------------------------------------------ content
     def compose(self) -> ComposeResult:
         """Lay out: first lines, picture and drag pad left, tables right, keys below."""
         yield Static(id="status")
@@ -245,7 +244,6 @@ class ConsoleDisplay(EndingApp):
         rows = table_rows(name, view, panel.content_size.width)
         panel.show_rows(rows, is_chosen=is_chosen, nothing=NOTHING[name])
 
-    # ------------------------------------------------------------------ the robot a key means
     def _panel(self) -> Panel:
         return self.screen_stack[0].query_one(f"#{self.chosen}" if self.chosen in FIXED else "#turn", Panel)
 

@@ -145,7 +145,6 @@ def stop_meant(stopped: Sequence[str], *, held: str, placed: str, wanted: str, s
     return meant or (stopped[0] if len(stopped) == 1 else "")
 
 
-# ---------------------------------------------------------------------- the last line
 @dataclass(frozen=True)
 class Hint:
     """A key that the last line names.

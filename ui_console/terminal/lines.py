@@ -58,7 +58,6 @@ class Row:
     text: Text = field(compare=False)
 
 
-# ---------------------------------------------------------------------- rows on lines
 def laid_out(rows: Sequence[Row], here: str | None, columns: int, room: int) -> list[list[Text]]:
     """Return the lines of each row; long rows wrap if there is room for all, else only the cursor's row wraps.
 
@@ -94,7 +93,6 @@ def _cut(text: Text, columns: int) -> list[Text]:
     return lines
 
 
-# ---------------------------------------------------------------------- views as rows
 def table_rows(name: PanelName, view: views.ConsoleView, columns: int) -> list[Row]:
     """Return the rows of a table.
 

@@ -166,7 +166,6 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
     def _at_s(self) -> float:
         return self._play.playback.now_s()
 
-    # ------------------------------------------------------------------ keys that play
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Enable the keys of this screen that make sense for a recording; no key stops a robot."""
         is_own = action in {"end", "begin", "not_now"}

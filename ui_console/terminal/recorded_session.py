@@ -94,7 +94,7 @@ class RecordedSession(Session):
             await living
         return ExitCode(screen.return_code or ExitCode.DONE)
 
-    # ------------------------------------------------------------------ what a screen may ask; see Session
+    # What a screen may ask, see ``Session``.
     def closed(self) -> None:
         """End the playback, because the screen has ended."""
         self.play.end("the screen was closed")
@@ -135,7 +135,6 @@ class RecordedSession(Session):
             await self.play.wait_arrived()
             await first_to_end(look(), self.play.wait_elsewhere())
 
-    # ------------------------------------------------------------------ within
     def _new_console(self, launch: Launch, network: LocalNetwork, playback: Playback) -> HearingConsole:
         model = ConsoleModel(launch.name, self._user, TeamModel(launch.mission, ""), sees=False)
         bus = network.join(launch.address, playback)

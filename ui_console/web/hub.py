@@ -111,7 +111,6 @@ class WebHub:
         self.pictures_packed = 0
         """Number of pictures encoded as JPEG."""
 
-    # ------------------------------------------------------------------ operators come and go
     def enter(self, welcome: Welcome, former: Operator | None = None) -> Operator:
         """Return a new operator, whose page gets the whole view; ``former`` as in ``Operator``."""
         operator = Operator(self, welcome, former)
@@ -177,7 +176,7 @@ class WebHub:
             self.keys_changed()
             await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
 
-    # ------------------------------------------------------------------ services for operators; see OperatorServices
+    # Services for operators, see ``OperatorServices``.
     async def new_console(self, operator: Operator, robot: str, orders: Sequence[Order] = ()) -> Teleoperation:
         """Return a console for this operator; it claims the robot, or gives the orders, as soon as it runs."""
         number, welcome = next(self._consoles), operator.welcome
@@ -233,7 +232,6 @@ class WebHub:
         """Note whether any operator looks after the mission."""
         self.team.alarms.attention(any(one.is_there for one in self.clients), self.clock.now_s())
 
-    # ------------------------------------------------------------------ within
     def _answers_of(self, user: str) -> ConsentAnswers | None:
         """Return the questions at the page that this person watches, else at another open page of this person."""
         pages = [one for one in self.clients if one.welcome.user == user]

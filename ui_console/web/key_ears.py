@@ -37,7 +37,6 @@ ASKED_EVERY_S = 10.0  # chosen: a page that asks for unknown messages costs the 
 StartTask = Callable[[Coroutine[object, None, None], str], asyncio.Task[None]]
 
 
-# ---------------------------------------------------------------------- live
 class BusEar:
     """Receives messages from a bus; see ``KeyEar``.
 
@@ -86,7 +85,6 @@ class BusEar:
         self._schemas, self._translator = frozenset(classes), Translator(classes)
 
 
-# ---------------------------------------------------------------------- recorded
 class RecordingEar:
     """Reads a recording at the shown time; see ``KeyEar``.
 

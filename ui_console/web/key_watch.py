@@ -177,7 +177,6 @@ class KeyWatch:
         if (self._task is None or self._task.done()) and any(self._wanting()):
             self._task = self._start_task(self._look(), "look at keys")
 
-    # ------------------------------------------------------------------ within
     def _wanting(self) -> list[KeyWatcher]:
         return [one for one in self._clients() if one.key_sight.streams]
 

@@ -109,7 +109,6 @@ class Operator:
         self._work: dict[asyncio.Task[None], AtWork] = {}
         self._stops: set[asyncio.Task[None]] = set()
 
-    # ------------------------------------------------------------------ messages of the browser
     def obey(self, intent: protocol.Intent) -> None:
         """Carry out the browser's intent; a slow intent runs in its own task."""
         match intent:
@@ -178,7 +177,6 @@ class Operator:
         self._services.sights_changed()
         self._services.attention_changed()
 
-    # ------------------------------------------------------------------ messages to the browser
     def show(self, event: ConsoleEvent) -> None:
         """Process an event of this operator's robot."""
         if isinstance(event, Attention):
@@ -223,7 +221,6 @@ class Operator:
         """React to a new schedule: ask why this operator waits, if so."""
         self._console.act(Teleoperation.schedule_heard)
 
-    # ------------------------------------------------------------------ within
     def _by_press(self, moment: int, act: Callable[[Teleoperation], None]) -> None:
         """Move the robot, unless the press is from an earlier moment; this also covers a late message."""
         if moment == self.model.moment:

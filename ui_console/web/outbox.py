@@ -43,7 +43,6 @@ class Outbox:
         self.skipped = 0
         """Pictures that a newer one replaced before they were sent."""
 
-    # ------------------------------------------------------------------ in
     def put_section(self, name: str, body: bytes) -> None:
         """Queue a section of the view, unless the browser already has it.
 
@@ -107,7 +106,6 @@ class Outbox:
         stream.underway = {other: at for other, at in stream.underway.items() if at[0] > sent_s}
         return captured_s
 
-    # ------------------------------------------------------------------ out
     def next(self, now_s: float) -> str | bytes | None:
         """Return the next message: text, a picture's packet, or None; a returned message counts as sent."""
         if self._answers:

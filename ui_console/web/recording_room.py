@@ -116,7 +116,6 @@ class RecordingRoom:
         self._markers = msgspec.json.encode(self.play.markers)
         self.clients: dict[Viewer, None] = {}
 
-    # ------------------------------------------------------------------ the pages come and go
     def enter(self, welcome: Welcome) -> Viewer:
         """Return a new viewer, whose page gets the whole view."""
         viewer = Viewer(self._hub.enter(welcome))
@@ -157,7 +156,6 @@ class RecordingRoom:
                 viewer.refuse(NOT_NOW)
         self._tell(self.clients)
 
-    # ------------------------------------------------------------------ its life
     def end(self, reason: str) -> None:
         """Make ``run`` return."""
         self.play.end(reason)

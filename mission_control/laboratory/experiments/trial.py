@@ -148,7 +148,6 @@ class _Trial:
             lines = list(running.trace)
         return self._judge(lines, world, over_s), lines
 
-    # ------------------------------------------------------------------ course of the trial
     async def _claim(self, running: RunningMission) -> None:
         """Let watchers and consoles claim in order, each after the previous one's request."""
         condition = self._condition
@@ -192,7 +191,6 @@ class _Trial:
             self._waits_for = number, event
             await event.wait()
 
-    # ------------------------------------------------------------------ published messages
     def _decided(self, line: Line) -> None:
         if line["ev"] == "request" and line["arc"] in self._requested:
             self._requested[line["arc"]].set()
@@ -214,7 +212,6 @@ class _Trial:
         if is_true and not self._to_the_end:
             self._detected.set()
 
-    # ------------------------------------------------------------------ result
     def _judge(self, trace: list[Line], world: dict[str, float], over_s: float) -> Trial:
         frequencies = [f"video{channel}" for channel in range(1, self._condition.channels + 1)]
         agreed = agreement(trace, self._samples, self._condition.robots, frequencies, over_s)

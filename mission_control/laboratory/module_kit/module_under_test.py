@@ -127,7 +127,6 @@ def watched(module: AnyModule) -> AnyModule:
     return module
 
 
-# ---------------------------------------------------------------------- the rules
 def _check_names(module: Module, inputs: Mapping[str, object]) -> None:
     ports, name = ports_of(module.Inputs), default_name(type(module))
     known = [port.name for port in ports]

@@ -32,7 +32,6 @@ from resource_pool.resource_controller import RcParameters, ResourceController
 R = TypeVar("R", bound=RcParameters)
 
 
-# ---------------------------------------------------------------------- drivers
 class AuditedRadio:
     """A radio that records its packets; no robot receives them."""
 
@@ -80,7 +79,6 @@ class AuditedGrabber:
         """Do nothing: no device is open."""
 
 
-# ---------------------------------------------------------------------- RCs
 class AuditedRc(ResourceController[R]):
     """Records the begin and end of each hold, and its safe state."""
 
@@ -128,7 +126,6 @@ class AuditedFramegrabber(AuditedRc[FramegrabberParameters], Framegrabber):
         return []
 
 
-# ---------------------------------------------------------------------- ARCs
 class AuditedGate(Gate):
     """Records when it opens and when it shuts."""
 
@@ -180,7 +177,6 @@ class AuditedCaptureArc(AuditedArc, CaptureArc):
     """ARC kind 3."""
 
 
-# ---------------------------------------------------------------------- RC manager
 class AuditedRcManager(RcManager):
     """Records each of its decisions, and checks the invariants of its schedule after each."""
 

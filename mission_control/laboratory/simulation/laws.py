@@ -141,7 +141,6 @@ class _Judge:
         self._wanting: dict[str, float] = {}
         self._granted: dict[str, float] = {}
 
-    # ------------------------------------------------------------------ one thing after the other
     def judge(self, h: Happening) -> Iterator[Broken]:
         """Record an event and yield each law that it violates."""
         yield from self._overdue(h.at_s)
@@ -264,7 +263,6 @@ class _Judge:
         if h.who in self._beliefs:
             self._beliefs[h.who] = _Belief(None, h.at_s)
 
-    # ------------------------------------------------------------------ the RC manager's restart
     def _note_restart(self, h: Happening) -> None:
         """Record the holds that must stay, if only the RC manager had a fault lately and is soon restarted."""
         if h.what == "ends" or (h.what == "begins" and h.who != RC_MANAGER):
@@ -285,7 +283,6 @@ class _Judge:
     def _need_not_keep(self, arc: str) -> None:
         self._to_keep = {hold for hold in self._to_keep if hold[1] != arc}
 
-    # ------------------------------------------------------------------ beliefs
     def _compare(self, now_s: float) -> None:
         """Record for each pair that should agree the time since which it disagrees."""
         doubts: set[tuple[str, ...]] = set()
@@ -322,7 +319,6 @@ class _Judge:
                 what = f"{one} and {other} have not agreed on who holds what since {since_s:.4f} s"
                 yield Broken("true", now_s, what, (one, other))
 
-    # ------------------------------------------------------------------ the end
     def _progress(self, now_s: float) -> Iterator[Broken]:
         """Judge the calm: each owner that wanted time throughout, and had no rival of higher priority, got time."""
         if self._shape.policy == "strict":

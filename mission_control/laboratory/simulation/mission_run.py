@@ -117,7 +117,7 @@ class _PoolMission:
             subsystem = Subsystem.UI_CONSOLE if owner.console else Subsystem.MISSION_CONTROL
         return f"{subsystem}/{name}"
 
-    # ------------------------------------------------------------------ bring-up, in the papers' order
+    # Bring-up is in the papers' order.
     async def _bring_up(self) -> None:
         shape = self._shape
 

@@ -191,7 +191,6 @@ class LinkedNetwork(LocalNetwork):
         """Return all processes, including ended ones, in the order of their starts."""
         return list(self._begun)
 
-    # ------------------------------------------------------------------ life of processes
     def begin(self, process: SimulatedProcess) -> Link:
         """Return the link of a new process; the link comes up as soon as possible."""
         self._begun.append(process)
@@ -263,7 +262,6 @@ class LinkedNetwork(LocalNetwork):
         for each in list(others):
             each.block() if by > 0 else each.unblock()
 
-    # ------------------------------------------------------------------ transport
     def join(self, source: str, clock: Clock) -> LinkedBus:
         """Return a new bus of the present process."""
         return LinkedBus(self, source, clock, self.links[_own()])
@@ -333,7 +331,6 @@ class LinkedNetwork(LocalNetwork):
         else:
             own.carry(lambda: self._look(watching, address))
 
-    # ------------------------------------------------------------------ tokens
     def look_anew(self, link: Link) -> None:
         """Update all watchers after a change of this link."""
         for watching in list(self.watchers):

@@ -52,7 +52,6 @@ class Machines:
         self._starved: dict[str, tuple[float, float]] = {}
         self._next_pid = FIRST_PID
 
-    # ------------------------------------------------------------------ looking
     def find(self, name: str) -> SimulatedProcess | None:
         """Return the process of the component of this name, ready or not."""
         for process, life in self.lives.items():
@@ -85,7 +84,6 @@ class Machines:
         gaps = [gap_s for until_s, gap_s in self._starved.values() if now_s < until_s + LATE_STEPS * gap_s]
         return LATE_STEPS * max(gaps, default=0.0)
 
-    # ------------------------------------------------------------------ faults
     def starve(self, host: str, until_s: float, gap_s: float) -> None:
         """Give every process of this host, including new ones, a processor only for a moment every ``gap_s``."""
         self._starved[host] = max(until_s, self._starved.get(host, (0.0, 0.0))[0]), gap_s
@@ -108,7 +106,6 @@ class Machines:
         process.die()
         self._tasks[process].cancel()
 
-    # ------------------------------------------------------------------ processes
     def begin(self, name: str, host: str) -> SimulatedProcess:
         """Return a new, empty process."""
         self._next_pid += 1

@@ -83,7 +83,6 @@ class SimulatedOwner(Component[OwnerParameters]):
         self._driving_dice = Random(f"driving {self.parameters.seed} {self.name} {clock.now_s():.6f}")
         self._arc: ArcClient | None = None
 
-    # ------------------------------------------------------------------ life
     async def serve(self) -> None:
         """Claim, use and release the ARC repeatedly; in the calm keep the ARC and drive, or rest."""
         await self.clock.sleep_until_s(self.parameters.begins_s)
@@ -107,7 +106,6 @@ class SimulatedOwner(Component[OwnerParameters]):
         absence = self._arc.wish.absence() if self._arc is not None else None
         return [absence] if absence is not None else []
 
-    # ------------------------------------------------------------------ notices of the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
         """Record the grant."""
         self._audit.note(self.name, "resumed", arc=notice.arc, epochs=dict(notice.epochs))
@@ -122,7 +120,6 @@ class SimulatedOwner(Component[OwnerParameters]):
         """Record the end of the grant."""
         self._audit.note(self.name, "suspended", arc=notice.arc, reason=notice.reason, by=notice.by)
 
-    # ------------------------------------------------------------------ with an ARC
     async def _live_with_arc(self) -> None:
         arc = self._arc = ArcClient(self.bus, arc_name(self.bus, self.parameters.kind), self)
         self._audit.note(self.name, "claims", arc=arc.arc)
@@ -197,7 +194,6 @@ class SimulatedOwner(Component[OwnerParameters]):
     def _speed_rad_s(self) -> float:
         return round(self._driving_dice.uniform(-1.0, 1.0) * TOP_WHEEL_SPEED_RAD_S, 2)
 
-    # ------------------------------------------------------------------ requests to the ARC
     async def _command(self, what: str, doing: Awaitable[Applied]) -> None:
         try:
             applied = await doing

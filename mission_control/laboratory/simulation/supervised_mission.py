@@ -135,7 +135,7 @@ class _SupervisedMission:
         if watching.done() and not watching.cancelled() and (bug := watching.exception()) is not None:
             raise bug
 
-    # ------------------------------------------------------------------ bring-up, as ``bring_up.run_mission`` does it
+    # Bring-up is as in ``bring_up.run_mission``.
     async def _begin(self, folder: str) -> asyncio.Task[None]:
         """Return the launcher's task when the whole mission is ready."""
         own = self._launch("launcher", "", folder)
@@ -204,7 +204,6 @@ class _SupervisedMission:
     def _note_fall(self, fell: ProcessFell) -> None:
         self._audit.note(fell.name, "fell", how=fell.how)
 
-    # ------------------------------------------------------------------ faults
     def _strike(self, fault: SupervisionFault) -> None:
         self._audit.note("mission", "fault", fault=str(fault))
         match fault:

@@ -209,7 +209,7 @@ def _first_fall(happenings: list[Happening]) -> str | None:
     return None
 
 
-# ---------------------------------------------------------------------- bring-up, in the papers' order
+# Bring-up is in the papers' order.
 async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[..., AnyComponent]]) -> None:
     mission, hosts = running.description, running.hosts
     resources = [msgspec.to_builtins(resource) for resource in mission.resources]
