@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
-from bus_laws import SERVER, fail_on_bug, within
+from bus_laws import ASKER, SERVER, Heard, fail_on_bug, until_known, within
 from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock
@@ -64,6 +64,18 @@ async def host(directory: Path) -> AsyncIterator[Host]:
         for bus in made.buses:
             await bus.close()
         await hub.close()
+
+
+@asynccontextmanager
+async def listened_to(
+    folder: Path, conversation: Conversation = SAID
+) -> AsyncIterator[tuple[Host, ZenohBus, ZenohBus, Heard]]:
+    """Give a host, a sender on it, a bus that listens for the sender's newest pictures, and what it hears."""
+    async with host(folder) as near:
+        sender, listener, heard = near.join(SERVER), near.join(ASKER), Heard()
+        listener.subscribe(AT, conversation, Map, heard, latest=True)
+        await until_known(listener, sender)
+        yield near, sender, listener, heard
 
 
 async def until(holds: Callable[[], bool], what: str, act: Callable[[], None] = lambda: None) -> None:

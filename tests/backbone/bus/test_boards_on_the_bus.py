@@ -22,6 +22,7 @@ from hosts_with_boards import (
     Map,
     Sketch,
     host,
+    listened_to,
     picture,
     sending,
     until,
@@ -37,11 +38,8 @@ from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, WIRE_VERSI
 
 
 async def test_pictures_leave_the_network_and_are_neither_old_nor_doubled(folder: Path, network: list[int]) -> None:
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder) as (_near, sender, _listener, heard):
+        sent: list[int] = []
         send = sending(sender, sent)
         await until(lambda: len(heard.all) > 0, "the first picture", send)
         await until_near(network, send)
@@ -70,11 +68,7 @@ async def test_pictures_leave_the_network_and_are_neither_old_nor_doubled(folder
 async def test_only_large_values_of_large_conversations_and_all_bodies_and_commands_have_a_board(
     folder: Path, conversation: Conversation, size: int, is_near: bool
 ) -> None:
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard = Heard()
-        listener.subscribe(AT, conversation, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder, conversation) as (_near, sender, _listener, heard):
         sender.publish(AT, conversation, picture(1, size))
         await heard.until_count(1)
         assert (folder / "board").exists() is is_near
@@ -83,11 +77,8 @@ async def test_only_large_values_of_large_conversations_and_all_bodies_and_comma
 
 
 async def test_small_values_between_large_ones_come_in_order(folder: Path, network: list[int]) -> None:
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, Conversation.OUTPUTS, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder, Conversation.OUTPUTS) as (_near, sender, _listener, heard):
+        sent: list[int] = []
         await until_near(network, sending(sender, sent, conversation=Conversation.OUTPUTS))
         for size in (10, PICTURE, 10, 10, 200_000, 0):
             sending(sender, sent, size, Conversation.OUTPUTS)()
@@ -111,11 +102,8 @@ async def test_without_a_listener_a_picture_is_not_even_written(
 @pytest.mark.parametrize("how", ["far", "wildcard", "all", "overhears"])
 async def test_other_listeners_get_every_picture_by_the_network(folder: Path, network: list[int], how: str) -> None:
     """Of another host (without the folder), by wildcard, those that want all, and those that overhear."""
-    async with host(folder) as near:
-        sender, listener, other = near.join(SERVER), near.join(ASKER), near.join(THIRD, is_near=how != "far")
-        heard, also, sent = Heard(), Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder) as (near, sender, _listener, heard):
+        other, also, sent = near.join(THIRD, is_near=how != "far"), Heard(), list[int]()
         await until_near(network, send := sending(sender, sent))
         if how == "overhears":
             other.overhear(SAID, also, 10**9)
@@ -133,11 +121,8 @@ async def test_other_listeners_get_every_picture_by_the_network(folder: Path, ne
 
 async def test_a_second_sender_is_heard_while_the_first_goes_on(folder: Path, network: list[int]) -> None:
     """From another host, from a system without blackboards, and on this host."""
-    async with host(folder) as near:
-        first, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, first)
+    async with listened_to(folder) as (near, first, _listener, heard):
+        sent: list[int] = []
         await until_near(network, sending(first, sent))
         (folder / "elsewhere").mkdir()
         for source, its_folder in (
@@ -165,11 +150,8 @@ async def test_a_second_sender_is_heard_while_the_first_goes_on(folder: Path, ne
 
 
 async def test_a_replay_is_heard_beside_a_board(folder: Path, network: list[int]) -> None:
-    async with host(folder) as near:
-        sender, listener, player = near.join(SERVER), near.join(ASKER), near.join(THIRD)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder) as (near, sender, _listener, heard):
+        player, sent = near.join(THIRD), list[int]()
         await until_near(network, send := sending(sender, sent))
         recorded = Envelope(WIRE_VERSION, "resource_pool/then", 5, 1.0, "", picture(77))
 
@@ -216,11 +198,8 @@ async def test_a_withdrawn_subscription_leaves_the_board(folder: Path, network: 
 
 async def test_a_large_output_reaches_this_host_and_a_longer_one_is_refused(folder: Path) -> None:
     size = 3 * MAX_MESSAGE_BYTES
-    async with host(folder) as near:
-        sender, listener, far = near.join(SERVER), near.join(ASKER), near.join(THIRD, is_near=False)
-        heard = Heard()
-        listener.subscribe(AT, Conversation.OUTPUTS, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder, Conversation.OUTPUTS) as (near, sender, _listener, heard):
+        far = near.join(THIRD, is_near=False)
         sender.publish(AT, Conversation.OUTPUTS, picture(7, size))  # too long for the network, and yet the first
         await heard.until_count(1)
         assert bytes(heard.all[0].body.cells) == bytes([7]) * size
@@ -238,11 +217,8 @@ async def test_a_log_says_that_another_host_misses_values_that_are_too_long_for_
     folder: Path, caplog: pytest.LogCaptureFixture, is_far_there: bool
 ) -> None:
     """Otherwise a module there waits for ever, and nothing says why."""
-    async with host(folder) as near:
-        sender, listener, far = near.join(SERVER), near.join(ASKER), near.join(THIRD, is_near=False)
-        heard, missed = Heard(), Heard()
-        listener.subscribe(AT, Conversation.OUTPUTS, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder, Conversation.OUTPUTS) as (near, sender, _listener, heard):
+        far, missed = near.join(THIRD, is_near=False), Heard()
         if is_far_there:
             far.subscribe(AT, Conversation.OUTPUTS, Map, missed, latest=True)
             await until_known(far, sender)

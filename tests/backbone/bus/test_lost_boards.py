@@ -19,7 +19,7 @@ from hosts_with_boards import (
     Host,
     Map,
     Sketch,
-    host,
+    listened_to,
     sending,
     until,
     until_near,
@@ -39,11 +39,8 @@ async def test_without_memory_or_descriptors_pictures_go_by_the_network(
     def refuse(*_: object) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
 
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder) as (_near, sender, _listener, heard):
+        sent: list[int] = []
         send = sending(sender, sent, 2 * MOST_IN_PACKET)
         await until_near(network, send)
         with monkeypatch.context() as patched:
@@ -57,11 +54,8 @@ async def test_without_memory_or_descriptors_pictures_go_by_the_network(
 
 
 async def test_an_unreadable_value_on_a_board_is_counted_and_skipped(folder: Path, network: list[int]) -> None:
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder) as (_near, sender, listener, heard):
+        sent: list[int] = []
         await until_near(network, send := sending(sender, sent))
         sender.publish(AT, SAID, Sketch(1, "x" * PICTURE))
         await until(lambda: listener.statistics().unreadable == 1, "it is counted")
@@ -71,11 +65,8 @@ async def test_an_unreadable_value_on_a_board_is_counted_and_skipped(folder: Pat
 
 async def test_a_lost_board_sends_the_listener_to_the_network_at_once(folder: Path, network: list[int]) -> None:
     """The board alone is lost, such as with a folder that somebody removed; its sender goes on."""
-    async with host(folder) as near:
-        sender, listener = near.join(SERVER), near.join(ASKER)
-        heard, sent = Heard(), list[int]()
-        listener.subscribe(AT, SAID, Map, heard, latest=True)
-        await until_known(listener, sender)
+    async with listened_to(folder) as (_near, sender, _listener, heard):
+        sent: list[int] = []
         await until_near(network, send := sending(sender, sent))
         sender._outlet(AT, SAID).board.close()  # type: ignore[union-attr]  # noqa: SLF001
         count = len(heard.all)
