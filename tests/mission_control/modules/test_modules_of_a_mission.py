@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from backbone.bus.clock import run_virtual
 from backbone.keys import Conversation
+from backbone.mission import class_asking, class_probe
+from backbone.mission.arranged import UnitsQuestion
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import MissionInvalid, read_mission, read_mission_bytes
@@ -19,6 +23,18 @@ pytestmark = [pytest.mark.processes]
 
 TOP = Path(__file__).parents[3]
 GIVEN = '<given key="number" class="sample_modules:Number" address="ui_console/tester" conversation="events"/>'
+
+
+@pytest.fixture
+def _arranged_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ask the modules' classes in this process: no interpreter starts for it, as it does for other tests."""
+
+    def printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
+        assert what == "arrange"
+        questions = [msgspec.json.decode(one, type=UnitsQuestion) for one in about]
+        return [msgspec.json.encode(class_probe.arranged(one)) for one in questions], ""
+
+    monkeypatch.setattr(class_asking, "_printed", printed)
 
 
 def mission(*units: str, given: str = GIVEN, hosts: str = "") -> str:
@@ -118,6 +134,7 @@ STEP = '<parameter name="step" value="fast"/>'
 HOST = '<hosts><host name="base" address="127.0.0.1"/></hosts>'
 
 
+@pytest.mark.usefixtures("_arranged_here")
 @pytest.mark.parametrize(
     ("text", "told"),
     [
