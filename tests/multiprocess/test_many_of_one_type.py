@@ -45,6 +45,7 @@ def test_the_receivers_beyond_the_first_share_a_process_and_come_back_together(t
         ends_s = time.monotonic() + BACK_WITHIN_S
         while (again := shared(mission))[1] != names or again[0] == pid:
             assert time.monotonic() < ends_s, f"{names} are not back: {mission.status()}"
+            time.sleep(0.05)
 
 
 @pytest.mark.thorough

@@ -48,6 +48,7 @@ def stays_whole(mission: RunningMission) -> None:
     ends_s = time.monotonic() + HEALTHY_WITHIN_S
     while (status := mission.status())["health"] != "ok":
         assert time.monotonic() < ends_s, f"{status['health']}: {status['absent']}\n{mission.story()}"
+        time.sleep(0.05)
     restarted = {c["name"]: c["restarts"] for c in status["components"] if c["restarts"]}
     assert not restarted, f"{restarted}\n{mission.story()}"
     assert {"watch-scout1-capture", "watch-scout2-capture"} <= {each["arc"] for each in status["requests"]}

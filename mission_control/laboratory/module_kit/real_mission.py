@@ -5,7 +5,9 @@ Its hub listens on a socket in that folder, so it conflicts with no other missio
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import itertools
 import json
 import os
 import re
@@ -16,6 +18,7 @@ import threading
 import time
 import uuid
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,6 +31,11 @@ from backbone import run_files
 from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.command_line.status import picture_without_hub
+from backbone.errors import BackboneError, LinkError
+from backbone.picture.health import HealthWord
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture
 from mission_control.laboratory.module_kit.virtual_mission import is_text
 
 READY_WITHIN_S = 60.0  # chosen: enough on a machine that is busy with other tests
@@ -36,11 +44,14 @@ MARK = "SCOUT_TEST_MARK"
 BIN = Path(sys.executable).parent
 DOWN_WITHIN_S = 30.0  # chosen: same
 GONE_WITHIN_S = 3.0  # chosen: a killed process is gone at once, on a busy machine a moment later
+LOOK_EACH_S = 0.05  # chosen: a status takes a fifth of that, so that who waits leaves the processor to the mission
 JsonObject = dict[str, Any]
 
 FILES = re.compile(r"""(?:\bmjcf|\bname\s*=\s*["']floor_plan["']\s+value)\s*=\s*["'](?=[^/"'])""")
 """Begin of an attribute that names a file relative to the mission file."""
 QUOTES = {'"': "&quot;", "'": "&apos;"}
+_LOOKERS = itertools.count()
+"""A number for each that looks, because two buses of one name would count their messages twice."""
 LAST_LINES, LAST_OF_A_LOG = 60, 15  # chosen: a person reads no more of a failure
 
 
@@ -79,11 +90,25 @@ class RealMission:
         )
 
     def status(self) -> JsonObject:
-        """Return ``status --json``."""
-        done = self.command("scout-backbone", "status", "--json", "--mission", self.name)
-        _must_succeed(done)
-        found: JsonObject = json.loads(done.stdout)
+        """Return what ``status --json`` prints."""
+        with ThreadPoolExecutor(1) as asker:  # a command takes 0.3 s to start; this thread may have a loop that runs
+            try:
+                picture = asker.submit(asyncio.run, self._picture()).result()
+            except BackboneError as error:
+                raise AssertionError(f"no status of {self.name}: {error!r}") from error
+        if picture.health.word is HealthWord.FAILED:
+            raise AssertionError(f"{self.name} has failed: {picture.to_json()}")
+        found: JsonObject = json.loads(json.dumps(picture.to_json()))
         return found
+
+    async def _picture(self) -> MissionPicture:
+        with runtime_directory(self.environment["XDG_RUNTIME_DIR"]):
+            found = run_files.find(self.name)
+        try:
+            async with self.bus(f"ui_console/looker-{os.getpid()}-{next(_LOOKERS)}") as bus:
+                return await look(bus, self.clock.now_s(), rate=found.clock_rate)
+        except LinkError as error:
+            return picture_without_hub(found, error)
 
     def wait_for_components(self, *names: str, within_s: float = 10.0) -> None:
         """Wait until components of these names run; children of behaviors start a moment after the mission is ready."""
@@ -91,6 +116,8 @@ class RealMission:
         while missing := set(names) - {component["name"] for component in self.status()["components"]}:
             if time.monotonic() > ends_s:
                 raise AssertionError(f"not there within {within_s} s: {', '.join(sorted(missing))}")
+            self.news.clear()
+            self.news.wait(LOOK_EACH_S)
 
     def component(self, name: str) -> JsonObject:
         """Return the component of this name in the status."""
