@@ -241,8 +241,8 @@ def mission_up(
             try:
                 running.wait_for_line("^all ready", READY_WITHIN_S)
                 yield running
-                if launcher.poll() is None:
-                    running.down()
+                launcher.terminate()  # as ``down`` would ask it, without a command that starts for it
+                launcher.wait(DOWN_WITHIN_S)
                 left = wait_gone(mark, GONE_WITHIN_S)
                 if left:
                     raise AssertionError(f"left behind: {left}")
