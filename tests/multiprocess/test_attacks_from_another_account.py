@@ -163,7 +163,7 @@ def test_no_attack_without_the_secret_changes_a_mission_on_three_machines(victim
         assert base.listens_at() == [f"{base.address}:7447"]
         folder = base.runtime_folder / "scout-backbone" / NAME
         let_others_enter(base.runtime_folder)
-        before = {name: c["pid"] for name, c in mission.components().items() if name in mission.names}
+        before = {name: c.pid for name, c in mission.components().items() if name in mission.names}
         given = {
             "uid": pwd.getpwnam("nobody").pw_uid,
             "mission": NAME,
@@ -178,6 +178,6 @@ def test_no_attack_without_the_secret_changes_a_mission_on_three_machines(victim
             found = attacks(given | {"lines": lines_of(host.processes())}, ("ip", "netns", "exec", host.namespace))
             assert sum(found["tried"].values()) == ATTEMPTS // 2
             assert found["reached"] == {}, found
-        after = {name: c["pid"] for name, c in mission.components().items() if name in mission.names}
+        after = {name: c.pid for name, c in mission.components().items() if name in mission.names}
         assert after == before, mission.story()
         assert {process.environ().get(MARK) for process in base.processes()} == {mission.environment[MARK]}

@@ -45,8 +45,7 @@ class Night:
             host: mission.hosts[host].folder / ("night.mcap" if host == "base" else f"night-{host}.mcap")
             for host in HOSTS
         }
-        there = mission.components().values()
-        self.hosts = {f"{c['subsystem']}/{c['name']}": str(c["host"]) for c in there}
+        self.hosts = {one.address: one.host for one in mission.components().values()}
         self.joined = self.files["base"].with_name("joined.mcap")
         self.said = ""
 

@@ -9,8 +9,7 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,10 +17,6 @@ from namespaces import hosts_on_a_switch
 from three_hosts import NAME, Copies, ThreeHosts, machines, mission_on_three_hosts
 
 from backbone.addresses import LAUNCHER
-from backbone.authentication import secret_of, socket_endpoint
-from backbone.bus.clock import MissionClock
-from backbone.bus.interface import Bus
-from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskState, ComponentState
 from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
 from resource_pool.arc_client import ask_stop, lift_stop, stop_robot
@@ -44,7 +39,7 @@ def mission() -> Iterator[ThreeHosts]:
 @pytest.mark.alone
 def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_keeps_its_secret(mission: ThreeHosts) -> None:
     there = mission.components()
-    assert (there["scout1"]["host"], there["scout2"]["host"]) == ("near", "far")
+    assert (there["scout1"].host, there["scout2"].host) == ("near", "far")
     assert any("✓ host near" in line for line in mission.up.lines), mission.story()
     for host in mission.hosts.values():
         secret = (mission.hosts["near"].folder / "secret").read_text().partition(":")[2].strip()
@@ -58,14 +53,14 @@ def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_keeps_its
 
 @pytest.mark.alone
 def test_a_hub_that_is_killed_is_back_before_anything_ends_on_the_other_hosts(mission: ThreeHosts) -> None:
-    before = {name: c["pid"] for name, c in mission.components().items() if c["host"] == "far"}
-    hub = mission.components()["nameserver"]["pid"]
+    before = {name: c.pid for name, c in mission.components().items() if c.host == "far"}
+    hub = mission.components()["nameserver"].pid
     os.kill(hub, signal.SIGKILL)
     took_s = mission.wait("all is there again", mission.is_whole, 10.0)
     print(f"hub killed: whole after {took_s:.1f} s")
     there = mission.components()
-    assert there["nameserver"]["pid"] != hub
-    assert {name: there[name]["pid"] for name in before if name in there} == before, mission.story()
+    assert there["nameserver"].pid != hub
+    assert {name: there[name].pid for name in before if name in there} == before, mission.story()
 
 
 @pytest.mark.thorough
@@ -109,19 +104,19 @@ def test_a_host_that_dies_and_is_back_gets_its_components_again(mission: ThreeHo
         took_s = mission.wait("the mission is whole again", mission.is_whole, 60.0)
         print(f"dead for {away_s} s: whole {took_s:.1f} s after it is back, copies {dict(copies.longest_s)}")
         assert took_s < (HEALED_WITHIN_S if away_s > 1 else ON_A_BUSY_MACHINE_S), mission.story()
-        assert mission.components()["scout2"]["host"] == "far"
+        assert mission.components()["scout2"].host == "far"
     assert asyncio.run(lifted(mission, "scout2")) == stop, "a new machine knows nothing of the stop by itself"
 
 
 async def stopped(mission: ThreeHosts, robot: str) -> tuple[int, str]:
-    async with operator(mission) as bus:
+    async with mission.bus() as bus:
         state = await stop_robot(bus, robot, "fire", "anna")
     return state.number, state.reason
 
 
 async def lifted(mission: ThreeHosts, robot: str) -> tuple[int, str]:
     """Lift the stop in force; return its number and reason."""
-    async with operator(mission) as bus:
+    async with mission.bus() as bus:
         state = await ask_stop(bus, robot)
         assert state.is_stopped
         await lift_stop(bus, state, "anna")
@@ -139,7 +134,7 @@ def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwh
         assert "scout-backbone creator --host far --connect tcp/" in far.remedy
         assert "near" not in {absent.name for absent in state.absent}
         launcher = mission.components()["launcher"]
-        assert launcher["feedback"] == "waits for host far", mission.story()
+        assert launcher.feedback == "waits for host far", mission.story()
         assert mission.up.process.poll() is None
         assert mission.type_on_base("scout-backbone", "down", "--mission", NAME).returncode == 0
         assert mission.up.process.wait(20) == 6
@@ -241,20 +236,8 @@ def test_two_copies_on_two_machines_are_seen(short_path: Path) -> None:
         assert 0.5 < copies.longest_s["watcher"] < 2.0
 
 
-@asynccontextmanager
-async def operator(mission: ThreeHosts) -> AsyncIterator[Bus]:
-    """Join through the unix socket, which no namespace hides from this machine's root."""
-    folder = mission.hosts["base"].runtime_folder / "scout-backbone" / NAME
-    config = client_config(socket_endpoint(folder), secret_of(str(folder)))
-    bus = await ZenohBus.open_when_up(NAME, "ui_console/tester", MissionClock.started_now(), config)
-    try:
-        yield bus
-    finally:
-        await bus.close()
-
-
 async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
-    async with operator(mission) as bus:
+    async with mission.bus() as bus:
         return await bus.ask(LAUNCHER, AskState(), ComponentState, within_s=5.0)
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
-import json
+import itertools
 import os
 import re
 import shlex
@@ -14,15 +15,23 @@ import threading
 import time
 import uuid
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import psutil
 import pytest
 from namespaces import NetworkHost, hosts_on_a_switch
 from running_mission import MARK, MISSION_XML
+
+from backbone.addresses import NAMESERVER
+from backbone.authentication import secret_of, socket_endpoint
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.messages import ComponentState
+from backbone.errors import BackboneError
+from backbone.nameserver.messages import Components, ListComponents
+from backbone.naming import Subsystem, component_of
 
 BIN = Path(sys.executable).parent
 NAME = "three-hosts"
@@ -30,6 +39,9 @@ READY_WITHIN_S = 90.0
 SAMPLE_EACH_S = 0.05
 WAITING = re.compile(r"waiting for host (?P<host>\S+); copy the secret there and type: (?P<command>.*)")
 SECRET = re.compile(r"the mission's secret, for its other hosts: (?P<path>.*)")
+ARCS = {"watch-scout1-capture", "watch-scout2-capture"}  # they start a moment after all is ready
+_LOOKERS = itertools.count()
+"""A number for each that looks, because two buses of one name would count their messages twice."""
 NO_COMPONENTS = re.compile(r"zygote-.*|scout-backbone|python.*|ip|sh|bash")
 
 
@@ -114,15 +126,33 @@ class ThreeHosts:
         out, said = process.communicate(timeout=60)
         return subprocess.CompletedProcess(words, process.returncode, out, said)
 
-    def components(self) -> dict[str, dict[str, Any]]:
-        """Return the components of ``status --json`` by name; none while it cannot be had."""
-        done = self.type_on_base("scout-backbone", "status", "--json", "--mission", NAME)
-        return {c["name"]: c for c in json.loads(done.stdout)["components"]} if done.returncode == 0 else {}
+    def components(self) -> dict[str, ComponentState]:
+        """Return the components by name; none while the hub does not answer."""
+        try:
+            return asyncio.run(self._components())
+        except (BackboneError, OSError):
+            return {}
+
+    async def _components(self) -> dict[str, ComponentState]:
+        async with self.bus(f"ui_console/looker-{next(_LOOKERS)}") as bus:
+            listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=5.0)
+        return {component_of(state.address): state for state in listed.components}
+
+    @contextlib.asynccontextmanager
+    async def bus(self, source: str = "ui_console/tester") -> AsyncIterator[ZenohBus]:
+        """Join through the unix socket, which no namespace hides from this machine's root."""
+        folder = self.hosts["base"].runtime_folder / "scout-backbone" / NAME
+        config = client_config(socket_endpoint(folder), secret_of(str(folder)))
+        bus = await ZenohBus.open_when_up(NAME, source, MissionClock.started_now(), config)
+        try:
+            yield bus
+        finally:
+            await bus.close()
 
     def lacks(self) -> dict[str, str]:
         """Return the components of the mission that are not ready, and the state of each."""
         there = self.components()
-        states = {name: there[name]["state"] if name in there else "absent" for name in self.names}
+        states = {name: there[name].state if name in there else "absent" for name in self.names}
         return {name: state for name, state in states.items() if state != "ready"}
 
     def is_whole(self) -> bool:
@@ -249,8 +279,10 @@ def mission_on_three_hosts(folder: Path, *options: str) -> Iterator[ThreeHosts]:
         mission.wait(
             "all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), READY_WITHIN_S
         )
-        mission.wait("ARCs are there", lambda: any("capture" in name for name in mission.components()), 20.0)
-        mission.names = frozenset(n for n, c in mission.components().items() if c["subsystem"] != "ui_console")
+        mission.wait("ARCs are there", lambda: mission.components().keys() >= ARCS, 20.0)
+        there = mission.components().items()
+        mission.names = frozenset(name for name, c in there if not c.address.startswith(Subsystem.UI_CONSOLE))
+        mission.wait("all are ready", mission.is_whole, 20.0)
         yield mission
         down = mission.type_on_base("scout-backbone", "down", "--mission", NAME)
         assert down.returncode == 0, down.stderr + mission.story()
