@@ -4,12 +4,26 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from pathlib import Path
+from subprocess import CompletedProcess
 
+from typer.testing import CliRunner
+
+from backbone.command_line.cli import app
 from mission_control.laboratory.module_kit import real_mission
 from mission_control.laboratory.module_kit.real_mission import BIN, MARK, marked, runtime_directory, wait_gone
 from mission_control.laboratory.module_kit.real_mission import RealMission as RunningMission
 
-__all__ = ["BIN", "MARK", "MISSION_XML", "RunningMission", "marked", "mission_up", "runtime_directory", "wait_gone"]
+__all__ = [
+    "BIN",
+    "MARK",
+    "MISSION_XML",
+    "RunningMission",
+    "asked",
+    "marked",
+    "mission_up",
+    "runtime_directory",
+    "wait_gone",
+]
 
 MISSION_XML = Path(__file__).parents[2] / "mission.xml"
 
@@ -23,3 +37,10 @@ def mission_up(
 ) -> AbstractContextManager[RunningMission]:
     """Bring a mission up; see ``real_mission.mission_up``."""
     return real_mission.mission_up(mission_xml, *options, name=name, change=change, beside=beside)
+
+
+def asked(mission: RunningMission, *words: str) -> CompletedProcess[str]:
+    """Run ``scout-backbone`` with these words against the mission, in this process: no interpreter starts for it."""
+    with runtime_directory(mission.environment["XDG_RUNTIME_DIR"]):
+        done = CliRunner().invoke(app, [*words, "--mission", mission.name], catch_exceptions=False)
+    return CompletedProcess(words, done.exit_code, done.stdout, done.stderr)

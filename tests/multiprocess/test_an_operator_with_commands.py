@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 from examples import rest_thorough
-from running_mission import BIN, RunningMission, mission_up
+from running_mission import BIN, RunningMission, asked, mission_up
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
@@ -32,37 +32,33 @@ def mission() -> Iterator[RunningMission]:
         yield running
 
 
-def backbone(mission: RunningMission, *words: str) -> subprocess.CompletedProcess[str]:
-    return mission.command("scout-backbone", *words, "--mission", mission.name)
-
-
 def test_who_moved_a_robot_is_found_after_the_console_has_gone(mission: RunningMission) -> None:
-    done = backbone(mission, "log", "--robot", "scout2", "--person", "anna b.", "--since", "10m", "--json")
+    done = asked(mission, "log", "--robot", "scout2", "--person", "anna b.", "--since", "10m", "--json")
     assert done.returncode == 0, done.stderr
     events = json.loads(done.stdout)["events"]
     assert [event["person"] for event in events if "is driven by" in event["what"]] == ["Anna B."]
     assert all(event["level"] in ("alarm", "warning", "notice", "info") for event in events)
-    shown = backbone(mission, "log", "--text", "DRIVEN BY").stdout
+    shown = asked(mission, "log", "--text", "DRIVEN BY").stdout
     assert "scout2" in shown
     assert "Anna B." in shown
 
 
 def test_a_story_is_one_object_and_calls_nobody_by_a_number(mission: RunningMission) -> None:
-    done = backbone(mission, "story", "scout2", "--json")
+    done = asked(mission, "story", "scout2", "--json")
     told = json.loads(done.stdout)
     assert told["name"] == "scout2"
     assert {"at_s", "level", "subject", "what", "person", "where", "cause"} == told["events"][0].keys()
-    shown = backbone(mission, "story", "scout2").stdout
+    shown = asked(mission, "story", "scout2").stdout
     assert "Anna B.: connected under epoch" in shown
     assert not re.search(r"console-\d+-drive", shown)
 
 
 def test_why_knows_machines_alarms_and_events(mission: RunningMission) -> None:
-    assert "base is a machine of the mission" in backbone(mission, "why", "base").stdout
-    assert "scout1 is ready on base" in backbone(mission, "why", "rc_down:scout1").stdout
-    causes = [event["cause"] for event in json.loads(backbone(mission, "story", "scout2", "--json").stdout)["events"]]
+    assert "base is a machine of the mission" in asked(mission, "why", "base").stdout
+    assert "scout1 is ready on base" in asked(mission, "why", "rc_down:scout1").stdout
+    causes = [event["cause"] for event in json.loads(asked(mission, "story", "scout2", "--json").stdout)["events"]]
     cause = next(each for each in reversed(causes) if each.startswith("backbone/rc_manager#"))
-    told = backbone(mission, "why", cause.removeprefix("backbone/")).stdout
+    told = asked(mission, "why", cause.removeprefix("backbone/")).stdout
     assert "this message led to:" in told
 
 
@@ -78,7 +74,7 @@ def test_a_robot_that_is_misspelled_is_one_sentence(mission: RunningMission) -> 
 
 @pytest.mark.parametrize("words", [("status",), ("why", "scout2"), ("story", "scout2"), ("log",), ("set", "radio")])
 def test_numbers_are_for_people(mission: RunningMission, words: tuple[str, ...]) -> None:
-    done = backbone(mission, *words)
+    done = asked(mission, *words)
     assert done.returncode == 0, done.stderr
     assert not LONG_NUMBER.search(done.stdout), done.stdout
 
@@ -129,19 +125,15 @@ def test_top_ends_when_its_time_is_over_though_nobody_reads_it(full_pipe: int, m
     assert "came faster than they were read" in done.stderr
 
 
-def injected(mission: RunningMission, key: str, said: str) -> subprocess.CompletedProcess[str]:
-    return mission.command("scout-backbone", "inject", key, said, "--mission", mission.name)
-
-
 def test_a_message_is_injected_and_the_log_tells_who_did(mission: RunningMission) -> None:
-    done = injected(mission, "resource_pool/scout1/ask", '{"schema": "AskState"}')
+    done = asked(mission, "inject", "resource_pool/scout1/ask", '{"schema": "AskState"}')
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     assert (answer["schema"].partition("/")[0], answer["address"]) == ("ComponentState", "resource_pool/scout1")
-    log = mission.command("scout-backbone", "log", "--robot", "scout1", "--text", "injects", "--mission", mission.name)
+    log = asked(mission, "log", "--robot", "scout1", "--text", "injects")
     assert "AskState/1 at resource_pool/scout1/ask" in log.stdout
     told = '{"schema": "StoryEvent", "at_s": 1, "where": "x/y", "what": "hello", "subject": "rover1", "cause": ""}'
-    assert injected(mission, "resource_pool/rover1/log", told).returncode == 0
+    assert asked(mission, "inject", "resource_pool/rover1/log", told).returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -163,21 +155,20 @@ def test_a_message_is_injected_and_the_log_tells_who_did(mission: RunningMission
     ),
 )
 def test_what_does_not_fit_is_not_injected(mission: RunningMission, key: str, said: str, code: int, told: str) -> None:
-    done = injected(mission, key, said)
+    done = asked(mission, "inject", key, said)
     assert (done.returncode, told in done.stderr) == (code, True), done.stderr
 
 
 def test_an_unknown_name_is_refused_with_its_likeliest_spelling(mission: RunningMission) -> None:
-    done = mission.command("scout-backbone", "why", "scuot1", "--mission", mission.name)
+    done = asked(mission, "why", "scuot1")
     assert done.returncode == 5
     assert "scout1" in done.stderr
 
 
 def test_a_parameter_of_a_running_behavior_is_set(mission: RunningMission) -> None:
-    words = ("scout-backbone", "set", "watch-scout1", "again_after_s", "2.5", "--mission", mission.name)
-    done = mission.command(*words)
+    done = asked(mission, "set", "watch-scout1", "again_after_s", "2.5")
     assert done.returncode == 0, done.stderr
-    wrong = mission.command(*words[:4], "soon", "--mission", mission.name)
+    wrong = asked(mission, "set", "watch-scout1", "again_after_s", "soon")
     assert wrong.returncode == 5
     assert "again_after_s" in wrong.stderr
 
@@ -185,7 +176,7 @@ def test_a_parameter_of_a_running_behavior_is_set(mission: RunningMission) -> No
 @pytest.mark.thorough
 def test_what_a_behavior_asks_for_is_shown_and_changed(mission: RunningMission) -> None:
     def set_(*words: str) -> subprocess.CompletedProcess[str]:
-        return mission.command("scout-backbone", "set", "--mission", mission.name, *words)
+        return asked(mission, "set", *words)
 
     assert set_("watch-scout1", "minimum_runtime_s", "4").returncode == 0
     assert set_("watch-scout1", "priority", "-3").stdout.splitlines()[0] == "watch-scout1: priority is -3"
@@ -204,7 +195,7 @@ def test_what_a_behavior_asks_for_is_shown_and_changed(mission: RunningMission) 
 
 def test_a_stopped_rc_is_started_again_when_it_is_claimed(mission: RunningMission) -> None:
     """RAM 2002: the RC manager checks that the RCs requested are running and starts them if they are not."""
-    stopped = mission.command("scout-backbone", "stop", "scout3", "--mission", mission.name)
+    stopped = asked(mission, "stop", "scout3")
     assert stopped.returncode == 0, stopped.stderr
     script = '{"at_s":0.1,"left_rad_s":2,"right_rad_s":2}\n{"at_s":0.3,"release":true}\n'
     words = ("scout-console", "attach", "scout3", "--priority", "100", "--mission", mission.name, "--script", "-")
@@ -215,9 +206,9 @@ def test_a_stopped_rc_is_started_again_when_it_is_claimed(mission: RunningMissio
 
 def test_an_rc_started_by_hand_comes_up_as_the_mission_file_says(mission: RunningMission) -> None:
     for words in (("stop", "scout2"), ("start", "scout", "--name", "scout2")):
-        done = mission.command("scout-backbone", *words, "--mission", mission.name)
+        done = asked(mission, *words)
         assert done.returncode == 0, done.stderr
-    shown = mission.command("scout-backbone", "set", "scout2", "network_id", "--mission", mission.name)
+    shown = asked(mission, "set", "scout2", "network_id")
     assert "2" in shown.stdout, shown.stdout + shown.stderr
     assert mission.component("scout2")["pid"] == mission.component("scout1")["pid"]
 
@@ -225,10 +216,10 @@ def test_an_rc_started_by_hand_comes_up_as_the_mission_file_says(mission: Runnin
 @pytest.mark.thorough
 def test_a_behavior_started_by_hand_has_its_place_in_the_tree(mission: RunningMission) -> None:
     for words in (("stop", "surveillance"), ("start", "surveillance", "--name", "surveillance")):
-        done = mission.command("scout-backbone", *words, "--mission", mission.name)
+        done = asked(mission, *words)
         assert done.returncode == 0, done.stderr
     wait_for(lambda: {"watch-scout1", "watch-scout2"} <= names(mission), "its children run again", mission)
-    other = mission.command("scout-backbone", "start", "wait", "--name", "surveillance", "--mission", mission.name)
+    other = asked(mission, "start", "wait", "--name", "surveillance")
     assert (other.returncode, "start.other_type" in other.stderr) == (5, True), other.stderr
 
 
@@ -250,8 +241,7 @@ def test_a_machine_that_is_offered_takes_components_and_leaves_nothing_when_it_i
     offered = subprocess.Popen([str(BIN / "scout-backbone"), *words], env=mission.environment, stderr=subprocess.PIPE)
     try:
         wait_for(lambda: "creator-field" in names(mission), "the creator is ready", mission)
-        start = ("scout-backbone", "start", "video_frequency", "--name", "video7", "--host", "field")
-        done = mission.command(*start, "--mission", mission.name)
+        done = asked(mission, "start", "video_frequency", "--name", "video7", "--host", "field")
         assert done.returncode == 0, done.stderr
         assert mission.component("video7")["host"] == "field"
     finally:
@@ -259,7 +249,7 @@ def test_a_machine_that_is_offered_takes_components_and_leaves_nothing_when_it_i
         _, said = offered.communicate(timeout=20)
     assert offered.returncode == 0, said
     wait_for(lambda: not {"creator-field", "video7"} & names(mission), "what ran there is gone", mission)
-    assert mission.command("scout-backbone", "stop", "video7", "--mission", mission.name).returncode == 0
+    assert asked(mission, "stop", "video7").returncode == 0
 
 
 def names(mission: RunningMission) -> set[str]:
@@ -270,3 +260,4 @@ def wait_for(holds: Callable[[], bool], what: str, mission: RunningMission) -> N
     deadline = time.monotonic() + 15.0
     while not holds():
         assert time.monotonic() < deadline, f"not within 15 s: {what}\n{mission.story()}"
+        time.sleep(0.05)
