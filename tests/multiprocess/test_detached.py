@@ -110,7 +110,7 @@ def test_of_two_that_start_at_once_one_comes_up_and_the_other_is_refused(tmp_pat
 def test_a_launcher_that_is_killed_before_all_is_ready_is_a_failure(tmp_path: Path) -> None:
     mark = uuid.uuid4().hex
     up = subprocess.Popen(
-        [str(BIN / "scout-backbone"), "up", str(mission_file(tmp_path, {})), "--detach"],
+        [str(BIN / "scout-backbone"), "up", str(SMALLEST), "--detach"],
         env=environment(tmp_path, mark),
         stderr=subprocess.PIPE,
         text=True,
