@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 
 import pytest
+from examples import rest_thorough
 from screen_on_a_terminal import screen_on_a_terminal
 
 pytestmark = pytest.mark.processes
@@ -37,7 +38,7 @@ def test_an_answer_arrives_as_the_place_of_the_cursor() -> None:
         played.wait_shown(b"ANSWERED-6-4")
 
 
-@pytest.mark.parametrize("multiplexer", ["TMUX", "STY"])
+@pytest.mark.parametrize("multiplexer", rest_thorough(["TMUX", "STY"]))
 def test_a_multiplexer_is_not_asked(multiplexer: str) -> None:
     with screen_on_a_terminal(PROGRAM, {multiplexer: "one"}) as played:
         played.wait_shown(b"BEGUN")

@@ -7,6 +7,7 @@ import signal
 import time
 
 import pytest
+from examples import rest_thorough
 from screen_on_a_terminal import WITHIN_S, screen_on_a_terminal
 
 from ui_console.terminal.driver import UNREAD_S
@@ -32,7 +33,7 @@ Screen().run()
 """
 
 
-@pytest.mark.parametrize("stop", [signal.SIGSTOP, signal.SIGTSTP])
+@pytest.mark.parametrize("stop", rest_thorough([signal.SIGSTOP, signal.SIGTSTP]))
 def test_a_screen_that_was_stopped_and_continued_reads_keys_and_ends(stop: signal.Signals) -> None:
     with screen_on_a_terminal(PROGRAM) as played:
         played.wait_shown(b"BEGUN")
@@ -47,7 +48,7 @@ def test_a_screen_that_was_stopped_and_continued_reads_keys_and_ends(stop: signa
         assert played.screen.wait(WITHIN_S) == 0
 
 
-@pytest.mark.parametrize("stop", [signal.SIGSTOP, signal.SIGTSTP])
+@pytest.mark.parametrize("stop", rest_thorough([signal.SIGTSTP, signal.SIGSTOP]))
 def test_keys_typed_while_a_screen_was_stopped_are_dropped_but_not_the_emergency_stop(stop: signal.Signals) -> None:
     with screen_on_a_terminal(PROGRAM) as played:
         played.wait_shown(b"BEGUN")

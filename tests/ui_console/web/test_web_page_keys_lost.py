@@ -22,7 +22,7 @@ TAKERS: dict[str, Callable[[Any], Awaitable[Any]]] = {
 }
 
 
-@pytest.mark.parametrize("taker", rest_thorough(TAKERS, quick=2))
+@pytest.mark.parametrize("taker", rest_thorough(TAKERS))
 async def test_a_key_whose_release_may_not_be_reported_counts_as_released(stage: Stage, taker: str) -> None:
     async with page_at(stage) as page:
         await take(page)

@@ -136,7 +136,7 @@ async def test_one_person_holds_two_robots_and_the_order_of_the_other_goes_on(fl
         assert await page.locator("body").get_attribute("data-held") == "scout2"
 
 
-@pytest.mark.parametrize("key", ["ArrowUp", "Space"])
+@pytest.mark.parametrize("key", rest_thorough(["Space", "ArrowUp"]))
 async def test_stick_and_space_take_the_robot_back_from_its_order(floor: Floor, key: str) -> None:
     async with map_at(floor) as page:
         await take(page)

@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
+from examples import rest_thorough
 from web_page import page_at, wait_until
 from web_stage import Stage
 
@@ -17,7 +18,7 @@ TOUCHES: dict[str, Callable[[Any], Awaitable[Any]]] = {
 }
 
 
-@pytest.mark.parametrize("touch", TOUCHES)
+@pytest.mark.parametrize("touch", rest_thorough(reversed(TOUCHES)))
 async def test_an_operator_who_touches_the_page_is_there_again(stage: Stage, touch: str) -> None:
     async with page_at(stage) as page:
         [operator] = stage.hub.clients

@@ -354,7 +354,7 @@ async def test_without_a_robot_x_stops_the_one_whose_card_has_the_focus(stage: S
         assert not stage.robots["scout1"].is_stopped
 
 
-@pytest.mark.parametrize(("button", "robots"), [(1, ["scout1"]), (3, ["scout1", "scout2", "scout3"])])
+@pytest.mark.parametrize(("button", "robots"), rest_thorough([(3, ["scout1", "scout2", "scout3"]), (1, ["scout1"])]))
 async def test_a_gamepad_stops_one_and_all(stage: Stage, button: int, robots: list[str]) -> None:
     async with page_at(stage, script=GAMEPAD) as page:
         await take(page)
