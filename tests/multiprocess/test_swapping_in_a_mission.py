@@ -196,7 +196,8 @@ async def test_a_person_exchanges_a_module_and_a_new_start_has_the_new_class(
         done = await command(mission, *words[:3])
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGCONT)
-        if mission.component("answering")["pid"] == pid:  # on a busy machine its creator may have replaced it already
+        there = {one["pid"] for one in mission.status()["components"]}
+        if pid in there:  # on a busy machine its creator may have replaced it already, or do so now
             assert done.returncode == 5
             assert "answering does not answer" in done.stderr
 
