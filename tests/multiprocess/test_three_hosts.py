@@ -133,8 +133,11 @@ def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwh
         assert (far.doing, far.vital) == ("waits for its creator", False)
         assert "scout-backbone creator --host far --connect tcp/" in far.remedy
         assert "near" not in {absent.name for absent in state.absent}
-        launcher = mission.components()["launcher"]
-        assert launcher.feedback == "waits for host far", mission.story()
+
+        def waits_for_far() -> bool:
+            return mission.components()["launcher"].feedback == "waits for host far"
+
+        mission.wait("the launcher says for whom it waits", waits_for_far, 5.0)
         assert mission.up.process.poll() is None
         assert mission.type_on_base("scout-backbone", "down", "--mission", NAME).returncode == 0
         assert mission.up.process.wait(20) == 6
