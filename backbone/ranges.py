@@ -30,7 +30,7 @@ from msgspec import Meta, Struct
 from backbone.naming import MAX_NAME_LENGTH
 from backbone.type_aliases import unaliased
 
-# ---------------------------------------------------------------------- how much
+# How much.
 MOST_ENTRIES = 65_536  # chosen: twice the leases of 10 000 ARCs on three RCs each
 MOST_FEW = 256  # chosen: tags, features, roles, steps of a path; the largest tested mission has 12
 MOST_STREAMS = 64  # chosen: one for each kind of packet; the largest mission has four
@@ -38,7 +38,7 @@ MANY = Meta(max_length=MOST_ENTRIES)
 FEW = Meta(max_length=MOST_FEW)
 FEW_STREAMS = Meta(max_length=MOST_STREAMS)
 
-# ---------------------------------------------------------------------- words
+# Words.
 LONGEST_MENTION = 255  # chosen: four names and their separators; the longest file name
 LONGEST_SOURCE = LONGEST_MENTION - 18  # leaves room for ``#<sequence>``
 LONGEST_LINE = 4_096  # chosen: far more than a person reads in one line
@@ -62,7 +62,7 @@ Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 Document = Annotated[str, Meta(max_length=LONGEST_DOCUMENT)]
 """A whole file."""
 
-# ---------------------------------------------------------------------- bytes
+# Bytes.
 MOST_PAYLOAD_BYTES = 4_096  # chosen: forty times the radio's longest packet
 Payload = Annotated[bytes, Meta(max_length=MOST_PAYLOAD_BYTES)]
 StateVector = Annotated[bytes, Meta(max_length=524_288)]  # chosen: 65 536 numbers; three Scouts need 700
@@ -75,7 +75,7 @@ MOST_BULK_BYTES = 60_000_000  # chosen: fits a message of the longest kind, see 
 Bulk = Annotated[memoryview, Meta(max_length=MOST_BULK_BYTES)]
 """Large data of a module's output, such as a map; over 8 MB it reaches listeners of the same host only."""
 
-# ---------------------------------------------------------------------- counts and ids
+# Counts and ids.
 EXACT = 2**53  # up to here integers are exact in a double, a JSON trace and JavaScript
 
 Epoch = Annotated[int, Meta(ge=0, le=EXACT)]
@@ -94,7 +94,7 @@ MOST_PX = 8_192  # chosen: twice the width of a 4K picture
 PixelCount = Annotated[int, Meta(ge=0, le=MOST_PX)]
 PixelPlace = Annotated[int, Meta(ge=-8_192, le=8_192)]  # a region may begin outside the picture
 
-# ---------------------------------------------------------------------- times, seconds
+# Times, seconds.
 A_DAY_S = 86_400.0  # chosen: as the longest time of a mission file
 Instant = Annotated[float, Meta(ge=-A_DAY_S, le=1e12)]
 """Mission time; negative: unknown, or before the mission began. Chosen: 1e12 s are still exact to 0.1 ms."""
@@ -113,7 +113,7 @@ LeaseSeconds = Annotated[float, Meta(ge=0, le=LONGEST_LEASE_S)]
 """Duration of a hold without renewal, mission time."""
 Rate = Annotated[float, Meta(gt=0, le=1_000)]  # chosen: mission seconds a second; --speed goes to 100
 
-# ---------------------------------------------------------------------- measures
+# Measures.
 Share = Annotated[float, Meta(ge=0, le=1)]
 """A share of a whole, 0 to 1."""
 Meters = Annotated[float, Meta(ge=-1e6, le=1e6)]  # chosen: a thousand kilometres from the corner of the room
@@ -130,7 +130,7 @@ Whole = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
 Facts = Annotated[dict[Mention, Text | Whole | Measure | bool], FEW]
 """A fact of a refusal, for programs."""
 
-# ---------------------------------------------------------------------- values of any kind
+# Values of any kind.
 Values = Annotated[dict[Mention, Any], MANY]
 """Named values of any kind, as in a mission file; ``wildness`` finds illegal values."""
 DEEPEST = 72  # chosen: a behavior tree is two deep for each of the 32 levels of a mission file; and room around it

@@ -107,7 +107,6 @@ class AggregateResourceController(Component[ArcParameters]):
         self._offering: asyncio.Task[None] | None = None
         self._commands = self._refused = 0
 
-    # ------------------------------------------------------------------ hooks
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Bring the connected RCs into the state that the owner expects.
 
@@ -115,7 +114,6 @@ class AggregateResourceController(Component[ArcParameters]):
         Raise a ``Refusal`` or ``LinkError`` if an RC cannot: then the ARC gives the set back.
         """
 
-    # ------------------------------------------------------------------ for derived classes
     @classmethod
     def abilities(cls) -> Abilities:
         """Return the commands that the ARC passes on; see ``Component``."""
@@ -153,7 +151,6 @@ class AggregateResourceController(Component[ArcParameters]):
         at = address(Subsystem.RESOURCE_POOL, self.rc(role))
         return await self.bus.ask(at, command.under(self.name, epoch), Applied, within_s=RC_REPLY_S)
 
-    # ------------------------------------------------------------------ life
     async def connect(self) -> None:
         """Find the sets of RCs that match the claim.
 
@@ -244,7 +241,6 @@ class AggregateResourceController(Component[ArcParameters]):
         """Count commands that passed, and commands refused because the gate was shut."""
         return {"commands": self._commands, "refused_swapped_out": self._refused}
 
-    # ------------------------------------------------------------------ asking for run time
     async def _send_request(self) -> None:
         """Send the request to the RC manager; end if the RC manager refuses it."""
         try:
@@ -260,7 +256,6 @@ class AggregateResourceController(Component[ArcParameters]):
         place = f", place {scheduled.position} in line" if scheduled.position else ""
         self.story.note(self.name, f"is {scheduled.state}{place}{behind}")
 
-    # ------------------------------------------------------------------ the gate
     async def _open(self, order: OpenGate) -> GateOpens:
         self._placed.choose(order.epochs)
         if self._gate.epochs == order.epochs:  # the same order came twice: the first continues
@@ -333,7 +328,6 @@ class AggregateResourceController(Component[ArcParameters]):
     def _longest_s(self) -> float:
         return max(self.parameters.minimum_runtime_s, self.parameters.maximum_runtime_s)
 
-    # ------------------------------------------------------------------ commands
     async def _command(self, command: Command) -> Applied:
         role = self._able.role_of(command)
         try:
@@ -359,7 +353,6 @@ class AggregateResourceController(Component[ArcParameters]):
             robot=self._placed.rc_of(self.body),
         )
 
-    # ------------------------------------------------------------------ watching
     async def _end_without_owner(self) -> None:
         self.end(await self._owner_watch.wait_gone())
 

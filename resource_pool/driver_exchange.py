@@ -144,7 +144,6 @@ class DriverExchanges:
         going.slot.open_gate()
         going.back.set()
 
-    # ------------------------------------------------------------------ the exchange
     async def swap(self, asked: SwapClass, slots: Sequence[DriverSlot]) -> Swapped:
         """Exchange the driver; return when the new one has passed its trial, or the old one is back.
 

@@ -77,7 +77,6 @@ class DriverSlot:
         self._limits: set[asyncio.Timeout] = set()
         self._given_up: set[asyncio.Timeout] = set()
 
-    # ------------------------------------------------------------------ for the exchange
     def shut(self, *, has_device: bool = True) -> None:
         """Make asynchronous calls wait from now on.
 
@@ -106,7 +105,6 @@ class DriverSlot:
         """Wait until no call is in progress."""
         await self._quiet.wait()
 
-    # ------------------------------------------------------------------ calls
     def call(self, name: str, arguments: tuple[object, ...], named: Mapping[str, object]) -> object:
         """Call a synchronous method."""
         driver = self.works

@@ -187,7 +187,6 @@ class Localizer(ResourceController[LocalizerParameters]):
         own = {"motions_heard": self._heard, "sightings_taken": self._sightings, "poses_published": self._poses}
         return {**super().statistics(), **own, "robots_known": len(self._robots)}
 
-    # ------------------------------------------------------------------ subscriptions
     def _applied(self, envelope: Envelope[Applied]) -> None:
         told, robot = envelope.body, self._robots.get(envelope.body.rc)
         if robot is None or envelope.source != address(Subsystem.RESOURCE_POOL, told.rc):
@@ -223,7 +222,6 @@ class Localizer(ResourceController[LocalizerParameters]):
         now_s = self.clock.now_s()
         return at_s if now_s - LATE_S * max(1.0, self.clock.rate) <= at_s <= now_s else now_s
 
-    # ------------------------------------------------------------------ answers and publications
     def _pose(self, body: str) -> Pose:
         robot = self._robots.get(body)
         if robot is not None:
@@ -262,7 +260,6 @@ class Localizer(ResourceController[LocalizerParameters]):
                 self._poses += 1
         self._keep(now_s)
 
-    # ------------------------------------------------------------------ from life to life
     async def _begin(self, name: str) -> None:
         """Begin with a robot: ask its RC how many commands it applied before this process of the localizer began."""
         try:

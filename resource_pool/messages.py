@@ -30,8 +30,9 @@ from backbone.ranges import (
 from backbone.scheduling.requests import Usage
 from backbone.wire import Message
 
+# Decision process → ARC.
 
-# ---------------------------------------------------------------------- decision process → ARC
+
 class GiveCommand(Message, frozen=True):
     """Send a command by its word, for owners that do not know its class.
 
@@ -132,7 +133,9 @@ class Applied(Message, frozen=True):
 ArcQuestion = GiveCommand | WantIdle | WantRuntime | WantLonger | Release | AskArc
 
 
-# ---------------------------------------------------------------------- ARC → decision process
+# ARC → decision process.
+
+
 class Resumed(Message, frozen=True, tag="Resumed/2"):
     """The RCs are granted: commands pass from now on.
 
@@ -206,7 +209,9 @@ class Noted(Message, frozen=True):
 ArcNotice = Resumed | SliceEnds | Suspending | Suspended | AskBeat
 
 
-# ---------------------------------------------------------------------- ARC → RCs
+# ARC → RCs.
+
+
 class LoadPacket(Message, frozen=True, tag="LoadPacket/2"):
     """Send this packet. Robot RCs ask this under the radio's grant to their ARC.
 
@@ -319,7 +324,9 @@ class Frame(Message, frozen=True):
             raise ValueError(f"{len(self.pixels)} pixels for {self.width_px} x {self.height_px}")
 
 
-# ---------------------------------------------------------------------- refusals
+# Refusals.
+
+
 class SwappedOut(Refusal):
     """The ARC has no grant; facts: ``reason``, ``by``, ``expected_start_s``."""
 

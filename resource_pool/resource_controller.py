@@ -133,7 +133,6 @@ class ResourceController(Component[R], Generic[R]):
         """Return the options of each built-in driver of this RC's kind, and of a named driver."""
         return options_of_drivers(cls.driver_kind, named, cls.driver_protocol) if cls.driver_kind else None
 
-    # ------------------------------------------------------------------ hooks
     async def connected(self, hold: Hold) -> None:
         """Prepare to serve this hold.
 
@@ -193,7 +192,6 @@ class ResourceController(Component[R], Generic[R]):
         """Return whether the source may send a command under this hold; True for the ARC that holds the RC."""
         return source == address(Subsystem.RESOURCE_POOL, hold.arc)
 
-    # ------------------------------------------------------------------ for derived classes
     def driver_site(self) -> DriverSite:
         """Return the interface for a driver of this RC."""
         return DriverSite(
@@ -252,7 +250,6 @@ class ResourceController(Component[R], Generic[R]):
             self.feedback,
         )
 
-    # ------------------------------------------------------------------ the life of a hold
     async def connect(self) -> None:
         """Subscribe to the RC manager's renewals."""
         self.bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases)

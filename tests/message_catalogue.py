@@ -93,7 +93,6 @@ def _fields(kind: type[Any]) -> tuple[inspect.Field, ...]:
     return described.fields
 
 
-# ---------------------------------------------------------------------- a plain value
 def _honest(kind: inspect.Type) -> Any:
     match kind:
         case inspect.StrType():
@@ -126,7 +125,6 @@ def _honest(kind: inspect.Type) -> Any:
             raise NotImplementedError(f"no plain value of {kind}")
 
 
-# ---------------------------------------------------------------------- at the limits: each must be read
 def _limits(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
     match kind:
         case inspect.StrType():
@@ -162,7 +160,6 @@ def _limits(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
             yield from _each_key(kind, _limits)
 
 
-# ---------------------------------------------------------------------- beyond them: none may be read
 def _beyond(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
     match kind:
         case inspect.StrType():

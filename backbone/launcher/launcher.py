@@ -266,7 +266,6 @@ class Launcher(Component[NoParameters]):
             for launch in reversed(core_launches(self._description, self.launch, self._options)):
                 self.outcome.ended.append(await self._keeper.end(launch.name, "the mission ends"))
 
-    # ------------------------------------------------------------------ start
     def _backbone_changed(self, address: str, stands: bool) -> None:
         if self._others.token_changed(address, stands, self.clock.now_s()):
             self.changed()
@@ -305,7 +304,6 @@ class Launcher(Component[NoParameters]):
         async with self._step("behaviors"):
             await self._wishes.start_all(behavior_orders(description))
 
-    # ------------------------------------------------------------------ stop
     async def _run_last(self, reason: str) -> None:
         """Stop consoles and behaviors, run the last branch, then end."""
         order = last_order(self._tree.description)
@@ -379,7 +377,6 @@ class Launcher(Component[NoParameters]):
         for offer in self._others.offering:
             self._observer.announce(f"{offer} did not confirm its end; a machine that is cut off ends all by itself")
 
-    # ------------------------------------------------------------------ watch
     def _core_service_fell(self, fell: ProcessFell) -> None:
         self.publish_event(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
 

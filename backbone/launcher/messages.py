@@ -45,7 +45,9 @@ class Tree(Message, frozen=True):
     text: Document
 
 
-# ---------------------------------------------------------------------- changes
+# Changes.
+
+
 class AddBranch(Message, frozen=True):
     """Add a branch to the running tree.
 
@@ -158,7 +160,9 @@ class NotUpYet(Refusal):
     remedy = "Try again when 'scout-backbone status' shows the mission."
 
 
-# ---------------------------------------------------------------------- to a behavior
+# To a behavior.
+
+
 class TakeBranch(Message, frozen=True):
     """The tree has changed at or around a behavior. The behavior ends the children that it no longer has.
 

@@ -143,7 +143,6 @@ class TreeKeeper:
             self._orders_of, self._orders = self.description, orders(self.description)
         return self._orders
 
-    # ------------------------------------------------------------------ one change
     async def _change(self, change: TreeChange, user: str) -> TreeChanged:
         if change.version != self.version:
             raise TreeChangedMeanwhile(
@@ -209,7 +208,6 @@ class TreeKeeper:
                 return
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
 
-    # ------------------------------------------------------------------ behaviors that stay
     async def _revise(self, order: Start) -> None:
         """Make its next start use the new order; the parent starts a component that is not placed."""
         try:
@@ -259,7 +257,6 @@ class TreeKeeper:
         if (name := component_of(at)) in self._moved:
             self._begin(self._tell_later(name), f"tell {name}")
 
-    # ------------------------------------------------------------------ values
     async def _set(self, change: SetInTree, value: object, user: str) -> None:
         """Send the value to its present user: a run time to the ARC, a parameter to the behavior.
 

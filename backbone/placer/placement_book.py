@@ -67,7 +67,6 @@ class PlacementBook:
         self.fences = Fences(self.is_alive)
         self._failed_s: dict[tuple[str, str], float] = {}
 
-    # ------------------------------------------------------------------ views
     def record(self, name: str) -> PlacementRecord:
         """Return the record of this name.
 
@@ -136,7 +135,6 @@ class PlacementBook:
             if record.missing_since_s >= 0 and not record.unwanted
         ]
 
-    # ------------------------------------------------------------------ starting and stopping
     def number(self, type_name: str) -> str:
         """Return ``<type>-<n>`` with a new n; numbers only grow, so the stories of two components never mix."""
         self._numbers[type_name] = self._numbers.get(type_name, 0) + 1
@@ -235,7 +233,6 @@ class PlacementBook:
         while len(self._stopped) > STOPPED_KEPT:
             del self._stopped[next(iter(self._stopped))]
 
-    # ------------------------------------------------------------------ reports of creators and nameserver
     def creator_up(
         self, host: str, tags: Collection[str], creator_pid: int, processes: Collection[ProcessState], asked_s: float
     ) -> list[Instruction]:
@@ -340,7 +337,6 @@ class PlacementBook:
             self._hosts[host].inspected = len(listed), sum(record.host == host for record in self.records())
         return instructions
 
-    # ------------------------------------------------------------------
     def _colocation(self, record: PlacementRecord) -> str:
         """Return the host of the other members of its process; empty: no other member has a host."""
         spawn = record.spawn

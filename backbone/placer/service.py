@@ -109,7 +109,6 @@ class Placer(Component[PlacerParameters]):
         self._type_locks: dict[str, asyncio.Lock] = {}
         self._starts = self._refused = self._again = self._stops = self._orphans = 0
 
-    # ------------------------------------------------------------------ life
     async def connect(self) -> None:
         """Recovery: collect the processes of all creators before the first question can arrive."""
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._component_changed)
@@ -164,7 +163,6 @@ class Placer(Component[PlacerParameters]):
             "orphans_ended": float(self._orphans),
         }
 
-    # ------------------------------------------------------------------ start
     async def _start(self, order: Start, requester: str) -> Started:
         name = order.name or self._book.number(order.type)
         self._starts += 1
@@ -219,7 +217,6 @@ class Placer(Component[PlacerParameters]):
             await self._creators.revise(record.host, record.spawn)
         return StartRevised()
 
-    # ------------------------------------------------------------------ stop
     async def _stop(self, name: str, reason: str) -> Ended:
         record = self._book.record(name)
         record.unwanted = True
@@ -274,7 +271,6 @@ class Placer(Component[PlacerParameters]):
         while self._book.find(record.spawn.name) is record and self.clock.now_s() < until_s:
             await self._happened.or_at(until_s)
 
-    # ------------------------------------------------------------------ events
     def _component_changed(self, heard: Envelope[Message]) -> None:
         match heard.body:
             case Appeared(component=component) if component.type == CREATOR:
@@ -327,7 +323,6 @@ class Placer(Component[PlacerParameters]):
         self._happened.tell()
         self.changed()
 
-    # ------------------------------------------------------------------ after a loss
     async def _place_again(self, name: str) -> None:
         """Start a missing component until it runs or is unwanted; without a possible host it waits for a creator."""
         record = self._book.find(name)

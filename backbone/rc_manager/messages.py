@@ -43,7 +43,7 @@ BEAT_MISSED_S = 1.2  # chosen: one of two expected beats may be lost; a hung ARC
 LONGEST_PACKET_S = 10.0  # chosen: a radio abandons a packet after a second; a longer time is a fault of its driver
 
 
-# ---------------------------------------------------------------------- requests of ARCs
+# Requests of ARCs.
 
 
 class Withdraw(Message, frozen=True):
@@ -99,7 +99,9 @@ class Beat(Message, frozen=True):
     arc: Mention
 
 
-# ---------------------------------------------------------------------- to ARCs
+# To ARCs.
+
+
 class OpenGate(Message, frozen=True):
     """The ARC's RCs are connected: prepare them, wait until they have settled, then let commands pass.
 
@@ -166,7 +168,9 @@ class CurrentRequest(Message, frozen=True):
     waits_since_s: Instant = 0.0
 
 
-# ---------------------------------------------------------------------- to RCs
+# To RCs.
+
+
 class Connect(Message, frozen=True):
     """Serve this ARC from now on.
 
@@ -256,7 +260,9 @@ class Leases(Message, frozen=True):
     missing: Annotated[list[Mention], MANY] = []
 
 
-# ---------------------------------------------------------------------- for any component
+# For any component.
+
+
 class AskSchedule(Message, frozen=True):
     """Ask for the schedule."""
 

@@ -120,7 +120,6 @@ class RcManager(Component[RcManagerParameters]):
         self._found = Found({}, {})
         self._lines_published = 0
 
-    # ------------------------------------------------------------------ life
     async def connect(self) -> None:
         """Read the hardware and, after a restart, its holders; then watch the nameserver for changes."""
         self._log.begin(self.parameters.trace)
@@ -160,7 +159,6 @@ class RcManager(Component[RcManagerParameters]):
         """Return RCs that cannot be used, and ARCs that want time and cannot run."""
         return [*self._rcs.absences(), *self._arcs.absences(self.answers)]
 
-    # ------------------------------------------------------------------ questions
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ARCs, consoles and tools."""
         self._arcs.require_sender(asked)
@@ -235,7 +233,6 @@ class RcManager(Component[RcManagerParameters]):
         self._arcs.remember(request.arc)
         self.happened(Requested(request, rcs))
 
-    # ------------------------------------------------------------------ decisions and their execution
     def happened(self, event: Event, at_s: float | None = None) -> None:
         """Let the schedule manager decide on the event, at ``at_s`` or now, and begin to carry out its instructions."""
         at_s = self.clock.now_s() if at_s is None else at_s
@@ -271,7 +268,6 @@ class RcManager(Component[RcManagerParameters]):
         """Return whether only this ARC would lose the RC if the RC counted as down."""
         return rc not in self._rcs.up or all(lease.rc != rc or lease.arc == arc for lease in self.manager.leases())
 
-    # ------------------------------------------------------------------ presence
     def _take_over(self, found: Found) -> None:
         """Pass the hardware, the ARCs that hold it and those that wait to the schedule manager."""
         adopted = found.adopted(self._resources, self.clock.now_s())
@@ -352,7 +348,6 @@ class RcManager(Component[RcManagerParameters]):
         for rc in sorted(names & set(self._resources)):
             await self._rcs.meet(rc)
 
-    # ------------------------------------------------------------------ loops
     async def _wake_when_due(self) -> None:
         while True:
             self._wake.clear()

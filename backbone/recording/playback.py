@@ -51,7 +51,6 @@ class Playback:
             return self._at_s
         return min(self.end_s, self._at_s + (self._machine.now_s() - self._since_s) * self._speed)
 
-    # ------------------------------------------------------------------ verbs of a person
     def play(self, speed: float) -> None:
         """Let mission time pass from now on, ``speed`` seconds per second of the machine.
 
@@ -82,7 +81,6 @@ class Playback:
         self.is_playing = was_playing and self._at_s < self.end_s
         self._changed.set()
 
-    # ------------------------------------------------------------------ waits
     async def sleep_s(self, duration_s: float) -> None:
         """Sleep as long as so many mission seconds last while playing; yield at least once."""
         await self._machine.sleep_s(duration_s / self._speed * self._machine.rate)

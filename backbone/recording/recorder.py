@@ -346,7 +346,6 @@ class Recorder:
         except OSError as error:
             self._fill(str(error))
 
-    # ------------------------------------------------------------------ messages before the begin
     async def _ask(self) -> None:
         """Ask for states from before the begin; the answers are overheard like all others."""
         if not self._host_only and Conversation.TOLD in to_overhear(self._keys):

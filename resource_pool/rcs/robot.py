@@ -186,7 +186,6 @@ class RobotRc(ResourceController[P], Generic[P]):
             case _:
                 return await super().obey(hold, order)
 
-    # ------------------------------------------------------------------ hooks
     async def halt(self, hold: Hold) -> None:
         """Bring the robot to rest. When: at ``Halt``, and if commands stop. Override if one packet does not suffice."""
         await self._load(hold, self._protocol.halt())
@@ -201,7 +200,6 @@ class RobotRc(ResourceController[P], Generic[P]):
     def cease(self) -> None:
         """Generate no further packets. When: at once at an emergency stop, and at the end of a hold."""
 
-    # ------------------------------------------------------------------ for derived classes
     async def move(self, hold: Hold, order: Command, packet: bytes, *, is_moving: bool = True) -> None:
         """Repeat a packet that moves the robot, until the next command or for ``COMMAND_TIMEOUT_S``.
 

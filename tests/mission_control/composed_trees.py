@@ -55,7 +55,6 @@ Result = tuple[BehaviorStatus, int] | None
 """Final status and its tick; None: still running after the longest time."""
 
 
-# ---------------------------------------------------------------------- random trees
 @st.composite
 def _suspensions(draw: st.DrawFn) -> frozenset[int]:
     spans = draw(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 15)), max_size=3))
@@ -120,7 +119,6 @@ def impatient_trees(draw: st.DrawFn, kind: str, how: WhileSuspended = WhileSuspe
     return Plan(kind, "n", tuple(leaves), settings=settings)
 
 
-# ---------------------------------------------------------------------- by events
 class ByEvents:
     """Runs a tree through the rules, and checks on the way that nothing starts twice or after the end."""
 

@@ -10,7 +10,6 @@ from mission_control.composites import WhileSuspended
 from mission_control.messages import BehaviorStatus
 
 
-# ---------------------------------------------------------------------- by ticks: the reference
 class Tick:
     """A node as BehaviorTree.CPP has it: ``tick`` until it is no longer running, ``halt`` in between."""
 

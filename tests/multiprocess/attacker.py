@@ -53,7 +53,6 @@ class Attacker:
         self.reached: Counter[str] = Counter()
         self.answers: dict[str, str] = {}
 
-    # ------------------------------------------------------------------ over the bus
     def ask(self, session: zenoh.Session, source: str, address: str, question: Message) -> bytes | None:
         payload = write(Envelope(WIRE_VERSION, source, 1, 0.0, "", question))
         for reply in session.get(f"scout/{self.mission}/{address}/ask", payload=payload, timeout=5.0):
@@ -117,7 +116,6 @@ class Attacker:
             self.stop_the_launcher,
         ]
 
-    # ------------------------------------------------------------------ on the machine
     def read_the_secret(self) -> None:
         (self.folder / "secret").read_bytes()
 
@@ -157,7 +155,6 @@ class Attacker:
             self.kill_a_process,
         ]
 
-    # ------------------------------------------------------------------
     def ways_in(self) -> Iterator[tuple[str, str, dict[str, str]]]:
         modes = MODES[:1] if self.only_client else MODES
         guesses = GUESSES[:1] if self.only_client else GUESSES

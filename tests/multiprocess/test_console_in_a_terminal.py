@@ -162,7 +162,6 @@ def test_a_monitor_holds_nothing_asks_for_nothing_and_can_still_stop_all_robots(
         screen.shows(r"ENDED WITH 0")
 
 
-# ---------------------------------------------------------------------- whatever the terminal
 TERMINALS = ["TERM=xterm-256color", "TERM=vt100", "TERM=dumb", "NO_COLOR=1", "TEXTUAL_THEME=textual-light"]
 SIZES = [(80, 24), (120, 40), (200, 60)]
 COMMANDS = {

@@ -43,7 +43,6 @@ from backbone.scheduling.views import Schedule, Why
 pytestmark = [pytest.mark.processes, pytest.mark.slow]
 
 
-# ---------------------------------------------------------------------- IROS 2001, figure 2
 @pytest.mark.timeout(900)
 def test_figure_2s_mission_for_ten_minutes(tmp_path: Path, judged: Judged) -> None:
     """IROS 2001, section 5.1: five seconds each, and between them nothing but the switch."""
@@ -65,7 +64,6 @@ def test_figure_2s_mission_for_ten_minutes(tmp_path: Path, judged: Judged) -> No
     judged(file)
 
 
-# ---------------------------------------------------------------------- two groups
 FIRST_GROUP = frozenset({"watch-scout1", "watch-scout2", *RCS} - {"scout3"})
 SECOND = {"radio": "radio2", "video1": "video2", "grabber": "grabber2", "scout1": "scout4", "scout2": "scout5"}
 SECOND_GROUP = frozenset({"watch-scout4", "watch-scout5", *SECOND.values()})

@@ -57,7 +57,6 @@ def mission() -> Iterator[RunningMission]:
         yield running
 
 
-# ---------------------------------------------------------------------- a console inside this process
 @dataclass
 class Turn:
     """What one take-over looked like.
@@ -120,7 +119,6 @@ async def take_over(mission: RunningMission, bus: Bus, number: int) -> Turn:
     return turn
 
 
-# ---------------------------------------------------------------------- what the mission says
 class ScoutWatch:
     """The holders of scout1, by its RC's reports; the end of a hold is noted when it comes."""
 
@@ -180,7 +178,6 @@ async def audit(bus: Bus) -> None:
     assert (world["stale_packets"], world["jammed_frames"]) == (0, 0), world
 
 
-# ---------------------------------------------------------------------- the console's own process
 @contextlib.asynccontextmanager
 async def console_process(mission: RunningMission) -> AsyncIterator[asyncio.subprocess.Process]:
     """A real ``scout-console`` that drives what its standard input says."""
@@ -237,7 +234,6 @@ async def observed(mission: RunningMission) -> AsyncIterator[tuple[ZenohBus, Mis
         yield bus, MissionClock(found.clock_origin_monotonic_s, found.clock_rate), ScoutWatch(bus)
 
 
-# ---------------------------------------------------------------------- tests
 async def take_over_again_and_again(mission: RunningMission, cycles: int) -> list[float]:
     """Return how long after it asked each console drove, in s; all else that a take-over promises is asserted."""
     async with observed(mission) as (bus, _clock, _watch):

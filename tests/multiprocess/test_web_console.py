@@ -128,7 +128,6 @@ async def holds(bus: Bus, behavior: str) -> bool:
     return any(holder.arc.startswith(behavior) for rc in schedule.rcs if rc.rc == "scout1" for holder in rc.holders)
 
 
-# ---------------------------------------------------------------------- a real browser
 @asynccontextmanager
 async def page_at(size: str, port: int, token: str, script: str = "") -> AsyncIterator[Any]:
     """Open the page in a browser of this size, with a script that is run before its own."""

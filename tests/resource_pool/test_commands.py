@@ -31,7 +31,6 @@ commands = st.one_of(
 )
 
 
-# ---------------------------------------------------------------------- by class and by word
 @given(commands, st.text(max_size=8), st.integers(0, 9))
 def test_a_command_by_its_values_is_the_command_itself(command: Command, role: str, stop: int) -> None:
     values = {
@@ -65,7 +64,6 @@ def test_only_arc_and_epoch_change_on_the_way_to_the_rc(command: Command, arc: s
     assert sent.under(command.arc, command.epoch) == command
 
 
-# ---------------------------------------------------------------------- what consoles draw
 def test_the_forms_of_a_scout_have_units_and_the_limits_of_its_motors() -> None:
     abilities = Scout.abilities()
     forms = {form.word: form for form in abilities.commands}
@@ -112,7 +110,6 @@ def test_a_unit_is_the_longest_that_a_name_ends_with() -> None:
     ]
 
 
-# ---------------------------------------------------------------------- through an ARC
 def test_a_scout_moves_by_meters_and_radians(local_mission: Any) -> None:
     async def scene() -> None:
         async with a_pool(local_mission, ["scout1", "radio"]) as pool:

@@ -260,7 +260,6 @@ def test_time_never_runs_backwards(events: list[tuple[float, Event]]) -> None:
         assert robot.believe(-9.0).at_s == newest_s
 
 
-# ---------------------------------------------------------------------- doubt
 def test_an_error_of_the_heading_becomes_one_of_the_place_and_goes_on_the_way_back() -> None:
     begin = Doubt.of(0.0, 0.1)
     away = begin.moved(3.0, 4.0, 0.0, 0.0)
@@ -286,7 +285,6 @@ def test_a_doubt_stays_one_of_places_and_directions(
         assert doubt.larger(0.5, 0.1).spread_m > doubt.spread_m
 
 
-# ---------------------------------------------------------------------- landmarks
 def sight(ahead_m: float, left_m: float, heading_rad: float = 0.0) -> LandmarkSighting:
     return LandmarkSighting(0.0, "scout1", ahead_m, left_m, heading_rad)
 
@@ -322,7 +320,6 @@ def test_of_two_boards_that_look_alike_the_plainly_nearer_one_is_seen() -> None:
     assert sighted_from(plan(west, east), seen, lost) is None
 
 
-# ---------------------------------------------------------------------- places in mission files
 def test_places_are_read_in_meters_and_degrees() -> None:
     assert read_begins("scout1:1,2,90  other1:3.5,0") == {
         "scout1": FloorPose(1.0, 2.0, math.pi / 2),

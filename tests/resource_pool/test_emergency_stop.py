@@ -34,7 +34,6 @@ def payloads(pool: Pool, network_id: int) -> list[bytes]:
     return [packet.payload for packet in pool.radio_driver.heard_by(network_id)]
 
 
-# ---------------------------------------------------------------------- the robot
 def test_a_stop_without_a_grant_halts_the_holders_robot_and_tells_the_holder_who_and_why(local_mission: Any) -> None:
     async def main() -> None:
         async with a_pool(local_mission, RCS) as pool:
@@ -149,7 +148,6 @@ def test_a_stop_the_radio_does_not_take_is_told_as_unconfirmed_and_the_robot_sta
     run_virtual(main())
 
 
-# ---------------------------------------------------------------------- what was on its way
 @asynccontextmanager
 async def held_by_hand(pool: Pool, drive_period_s: float = 0.05) -> AsyncIterator[Bus]:
     """Give the voice of an ARC that holds scout1 and the radio, whose commands the test sends when it likes."""
@@ -296,7 +294,6 @@ async def late(pool: Pool, on_the_way_s: float, voice: Bus, what: Drive | Jump) 
     return await command(voice, what)
 
 
-# ---------------------------------------------------------------------- whatever is said, and said again
 LONG = {"a report": "x" * 5_000, "controls": "\U000e0001" * 5_000, "no UTF-8": "a file \udcff", "usual": "a child"}
 
 

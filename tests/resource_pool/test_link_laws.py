@@ -16,7 +16,6 @@ PAUSES = st.sampled_from([0.0, 0.05, 0.1, 0.45, 0.5, 0.7, 3.0])
 SHARES = st.floats(0, 1)
 
 
-# ---------------------------------------------------------------------- who is asked
 steps = st.lists(st.tuples(st.sampled_from(["packet", "reply"]), ROBOTS, PAUSES), max_size=60)
 
 
@@ -65,7 +64,6 @@ def test_one_robots_turns_do_not_depend_on_the_others(history: list[tuple[str, i
     assert alone == [turn for _, who, _, turn in played(history) if who == robot]
 
 
-# ---------------------------------------------------------------------- what is lost
 @given(st.lists(st.tuples(ROBOTS, st.booleans()), max_size=80))
 def test_silence_and_its_end_are_news_once_each_and_every_reply_is_counted(replies: list[tuple[int, bool]]) -> None:
     links = LinkWatch()
@@ -95,7 +93,6 @@ def test_the_news_comes_with_the_third_lost_reply() -> None:
     assert [links.heard(1) for _ in range(2)] == [LinkNews.ANSWERS, LinkNews.NONE]
 
 
-# ---------------------------------------------------------------------- what is published
 @given(st.lists(st.tuples(PAUSES, st.integers(0, 2)), max_size=40))
 def test_readings_are_published_when_they_change_not_too_often_and_the_newest_at_last(
     puts: list[tuple[float, int]],
@@ -121,7 +118,6 @@ def test_readings_are_published_when_they_change_not_too_often_and_the_newest_at
     assert book.due_s is None
 
 
-# ---------------------------------------------------------------------- what is an alarm
 @given(st.floats(0, 0.9), st.lists(SHARES, max_size=60))
 def test_a_low_battery_is_one_alarm_until_it_is_charged_again(alarm_share: float, charges: list[float]) -> None:
     battery = BatteryWatch(alarm_share)

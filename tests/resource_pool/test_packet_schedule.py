@@ -289,7 +289,6 @@ def test_what_has_no_successor_gives_way_to_the_safe_packet() -> None:
     assert [sending.packet.payload for sending in sent if sending] == [b"drive", b"safe"]
 
 
-# ---------------------------------------------------------------------- stops
 @given(st.lists(st.tuples(st.sampled_from(["load", "once", "take"]), st.booleans(), st.integers(0, 4)), max_size=30))
 def test_nothing_that_moves_a_robot_is_sent_once_a_packet_of_a_later_stop_was_loaded(
     steps: list[tuple[str, bool, int]],

@@ -39,7 +39,6 @@ from scout_model import radio_link
 REPLY_BITS = radio_link.packet_bits(radio_link.encode_reply(radio_link.ScoutReply(1.0, 0.0, 0.0)))
 
 
-# ---------------------------------------------------------------------- readings
 def test_a_scout_lists_its_reports_with_units_and_ranges() -> None:
     forms = [(form.name, form.unit, form.least, form.most) for form in Scout.abilities().reports]
     assert forms == [
@@ -111,7 +110,6 @@ def test_the_alarms_share_is_a_parameter_of_the_robot(local_mission: Any) -> Non
     run_virtual(main())
 
 
-# ---------------------------------------------------------------------- what a reply costs
 def test_the_radio_counts_the_replies_time_on_the_air(local_mission: Any) -> None:
     async def main() -> None:
         async with pool_in(local_mission, world_with()) as pool:
@@ -165,7 +163,6 @@ def test_replies_beyond_the_declared_time_delay_packets_by_no_more_than_their_ow
     assert max(late_s) == pytest.approx(REPLY_BITS / slow)
 
 
-# ---------------------------------------------------------------------- what is lost
 def test_replies_pass_the_same_air_as_packets_and_what_is_lost_is_counted_for_each_robot(local_mission: Any) -> None:
     async def main() -> None:
         async with pool_in(local_mission, world_with(radio_loss=0.3)) as pool:

@@ -205,7 +205,6 @@ async def test_closed_while_it_opens_it_closes_its_renderer_and_holds_nobody_up(
     assert log == ["made", "closed"]
 
 
-# ---------------------------------------------------------------------- neighbors in one process
 class CountedCamera(scout_model.camera.Camera):
     """A camera that counts those that are open."""
 

@@ -12,7 +12,6 @@ from resource_pool.stop_latch import MOST_AUTHORS, StopLatch
 from resource_pool.stop_messages import GivenBeforeStop, OtherStop
 
 
-# ---------------------------------------------------------------------- the latch
 @given(st.lists(st.tuples(st.sampled_from(["stop", "lift"]), st.integers(0, 4)), max_size=30))
 def test_a_robot_moves_only_if_its_last_stop_was_lifted_by_its_number(steps: list[tuple[str, int]]) -> None:
     latch, stopped, number = StopLatch("scout1"), False, 0
@@ -89,7 +88,6 @@ def test_a_lift_of_what_was_seen_before_somebody_else_stopped_too_lifts_nothing(
     assert latch.state.is_stopped
 
 
-# ---------------------------------------------------------------------- what a commander knows
 @given(st.lists(st.tuples(st.integers(1, 5), st.booleans()), max_size=20))
 def test_commands_carry_the_number_of_the_newest_stop_only_once_it_is_known_to_be_lifted(
     heard: list[tuple[int, bool]],

@@ -103,7 +103,6 @@ class Stage:
         if said.body.action is OperatorAction.LET_LIFT:
             self.agreed.append((self.pool.clock.now_s(), said.body.user))
 
-    # ------------------------------------------------------------------ what people do
     async def do(self, who: Person, what: str) -> None:
         sleep_s, console = self.pool.clock.sleep_s, who.console
         match what:
@@ -152,7 +151,6 @@ class Stage:
         while self.work:
             await asyncio.wait(self.work)
 
-    # ------------------------------------------------------------------ the law
     def check(self) -> tuple[int, int]:
         """Check all that was heard; return how many presses drove, and how many of them after a lift."""
         drove: dict[bytes, bool] = {}

@@ -45,7 +45,6 @@ def on_a_slope(slope_deg: float) -> World:
     return world(plateau, ramps=[ramp])
 
 
-# ---------------------------------------------------------------------- driving
 @pytest.mark.parametrize("slope_deg", [5.0, 10.0, 15.0, 20.0])
 def test_it_climbs_a_smooth_slope_up_to_twenty_degrees(slope_deg: float) -> None:
     """IROS 2001, section 2; up at not much less than the speed asked for, and on at the top."""
@@ -110,7 +109,6 @@ def test_it_drives_up_a_doorstep() -> None:
     assert z_m == pytest.approx(dimensions.WHEEL_RADIUS_M + 0.004, abs=0.002)
 
 
-# ---------------------------------------------------------------------- jumping
 @pytest.mark.parametrize("gap_m", [0.18, 0.24, 0.30])
 def test_it_jumps_over_a_box_of_thirty_centimetres_lands_and_drives_on(gap_m: float) -> None:
     """IROS 2001, section 2: jumping over objects 30 cm in height."""
@@ -160,7 +158,6 @@ def test_a_blow_that_is_no_number_or_hits_nobody_is_refused() -> None:
         room.strike("nobody", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-# ---------------------------------------------------------------------- energy
 def energies_j(model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> np.ndarray:
     """Motion, height and springs, the winch's rope among them, after each step."""
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY

@@ -140,7 +140,6 @@ def test_rendered_and_painted_pictures_show_the_same(gl: GlSupport, tmp_path: Pa
         assert changed(pictures["pioneer_scout2"], pictures["empty_scout2"]) > 1000
 
 
-# ---------------------------------------------------------------------- what is not drawn twice
 def test_an_unchanged_scene_is_drawn_once() -> None:
     world = room()
     with Camera(world.mjcf, "paint") as camera:

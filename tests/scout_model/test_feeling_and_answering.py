@@ -116,7 +116,6 @@ def scouts(*more: RobotPlace) -> World:
     return World(WorldDescription(9.0, 6.0, robots=[RobotPlace("scout1", 1, 2.0, 3.0, 0.0), *more]))
 
 
-# ---------------------------------------------------------------------- the world's side
 def feelers() -> World:
     places = [RobotPlace("a", 1, 5.0, 3.0, 0.0), RobotPlace("b", 2, 3.0, 3.0, 0.0, f"{__name__}:Feeler")]
     return World(WorldDescription(9.0, 6.0, robots=places))
@@ -168,7 +167,6 @@ def test_only_robots_with_the_methods_feel_and_answer() -> None:
     assert room.reply(77) == b""
 
 
-# ---------------------------------------------------------------------- the Scout's side
 def test_a_robot_feels_and_answers_through_a_program_that_passes_calls_on() -> None:
     room = scouts(RobotPlace("wrapped", 2, 8.0, 5.0, 0.0, f"{__name__}:Wrapped"))
     for network_id in (1, 2):
@@ -289,7 +287,6 @@ def test_a_battery_for_a_body_without_one_is_refused() -> None:
         scouts(RobotPlace("rover1", 2, 8.0, 5.0, 0.0, "rover:Rover", battery_j=40.0))
 
 
-# ---------------------------------------------------------------------- inclinometer
 @given(st.floats(0, math.pi), st.floats(-math.pi, math.pi), st.floats(3.0, 20.0))
 def test_what_is_felt_for_long_is_the_tilt(tilt_rad: float, around_rad: float, pull_m_s2: float) -> None:
     inclinometer, across_m_s2 = Inclinometer(), pull_m_s2 * math.sin(tilt_rad)

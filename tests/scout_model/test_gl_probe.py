@@ -95,7 +95,6 @@ def test_probing_imports_no_mujoco() -> None:
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
 
 
-# ---------------------------------------------------------------------- a success is believed by later missions
 @pytest.mark.processes
 def test_what_drew_is_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
     first = probe()

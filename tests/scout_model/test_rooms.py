@@ -61,7 +61,6 @@ def drive(world: World, frames: int, speed_rad_s: float = 10.0) -> None:
         world.step_frame()
 
 
-# ---------------------------------------------------------------------- tables and darkness
 def test_under_a_table_it_is_darker_than_under_the_sky() -> None:
     table = Furniture("desk", 4.0, 5.4, 1.6, 1.2, 0.4, "table")
     lit = view(World(described(robots=[scout(4.0, 5.3)])))
@@ -113,7 +112,6 @@ def test_furniture_in_a_dark_place_is_dark_too() -> None:
     assert levels[1] == pytest.approx(dimensions.DARKNESS * levels[0], rel=0.15)
 
 
-# ---------------------------------------------------------------------- ramps and landmarks
 def test_a_ramp_leads_up_in_its_own_direction() -> None:
     ramp = Ramp("ramp", 4.0, 3.0, 1.0, 0.6, 0.2, NORTH)
     world = World(described(ramps=[ramp]))
@@ -167,7 +165,6 @@ def test_a_landmark_is_blank_from_behind_and_stops_who_runs_into_it() -> None:
     assert world.position_m("scout1")[1] < 3.0
 
 
-# ---------------------------------------------------------------------- a room of one's own
 def test_a_room_of_ones_own_takes_the_place_of_walls_and_marks() -> None:
     world = World(described(mjcf=OWN_ROOM))
     model = mujoco.MjModel.from_xml_string(world.mjcf)
@@ -215,7 +212,6 @@ def test_a_broken_room_is_refused_with_what_is_wrong(mjcf: str, told: str) -> No
     assert refusal.value.remedy in str(refusal.value)
 
 
-# ---------------------------------------------------------------------- refusals
 @pytest.mark.parametrize(
     "parts",
     [
@@ -254,7 +250,6 @@ def test_a_thing_may_be_named_as_a_part_of_the_room(name: str, thing: Callable[[
     assert World(described(**thing(name))).frame == 0
 
 
-# ---------------------------------------------------------------------- targets
 @pytest.mark.parametrize("shape", ["pioneer", "person", "carrier"])
 def test_a_target_passes_the_same_places_at_the_same_times_in_every_world(shape: str) -> None:
     """IROS 2001, section 5.1: chosen for its ability to repeatedly travel over a path at an identical speed."""
@@ -271,7 +266,6 @@ def test_a_target_passes_the_same_places_at_the_same_times_in_every_world(shape:
     assert speeds_m_s == pytest.approx(0.5, abs=1e-9)
 
 
-# ---------------------------------------------------------------------- what only OpenGL shows
 @pytest.mark.parametrize(
     ("asset", "part", "lacks"),
     [
@@ -311,7 +305,6 @@ def test_shapes_that_the_painter_has_not_are_known_before_it_draws() -> None:
     assert unpainted(mjcf) == ["height fields and signed distance fields"]
 
 
-# ---------------------------------------------------------------------- anything that may be described
 sizes_m = st.floats(0.11, 2.0)
 places_m = st.tuples(st.floats(0.5, 8.5), st.floats(0.5, 5.5))
 turns_rad = st.floats(-math.pi, math.pi)

@@ -37,7 +37,6 @@ class Fairness:
         self._grants: list[tuple[float, str]] = []
         self._disturbed_s = inf
 
-    # ------------------------------------------------------------------ what happens
     def disturbed(self) -> None:
         """From now on no bound holds."""
         self._disturbed_s = min(self._disturbed_s, self._replay.now_s)
@@ -70,7 +69,6 @@ class Fairness:
             for group in connected(list(self._replay.world.arcs.values()), lambda arc: arc.uses):
                 self._compare_rivals(group)
 
-    # ------------------------------------------------------------------ waits
     def _compare_with_bound(self, wait: Wait) -> None:
         world = self._replay.world
         arc = world.arcs[wait.arc.name]
@@ -108,7 +106,6 @@ class Fairness:
         self._replay.now_s = time_s
         self._replay.report(code, arc.name, message)
 
-    # ------------------------------------------------------------------ turns and times
     def _compare_rivals(self, group: list[Arc]) -> None:
         """Compare those that were active from their first request on, if all of the group exclude each other."""
         world = self._replay.world

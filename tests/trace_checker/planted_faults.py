@@ -28,7 +28,6 @@ def _planter(function: Planter) -> Planter:
     return function
 
 
-# ---------------------------------------------------------------------- lines that are missing
 def _drops(event: str) -> None:
     def drop(lines: list[Line], rng: Random) -> bool:
         place = place_of(lines, rng, event)
@@ -101,7 +100,6 @@ def nothing_happens_from_now_on(lines: list[Line], rng: Random) -> bool:
     return True
 
 
-# ---------------------------------------------------------------------- lines that stand elsewhere
 @_planter
 def neighbors_change_places(lines: list[Line], rng: Random) -> bool:
     place = rng.randrange(1, len(lines) - 1)
@@ -189,7 +187,6 @@ def run_begins_late(lines: list[Line], rng: Random) -> bool:
     return True
 
 
-# ---------------------------------------------------------------------- lines too many
 @_planter
 def line_stands_twice(lines: list[Line], rng: Random) -> bool:
     place = rng.randrange(len(lines))

@@ -49,7 +49,6 @@ class Replay:
     def report(self, code: str, arc: str, message: str) -> None:
         self.found.append(Violation(code, self.now_s, arc, message))
 
-    # ------------------------------------------------------------------ lines
     def run(self, lines: list[Line]) -> list[Violation]:
         sound = [line for line in lines if self._is_sound(line)]
         sound.sort(key=lambda line: line["t"])  # a line that was written late keeps its time
@@ -94,7 +93,6 @@ class Replay:
             raise Malformed(f"unknown RC {name}")
         return self.world.rcs[name]
 
-    # ------------------------------------------------------------------ the mission
     def _on_meta(self, line: Line) -> None:
         self.grace_s, self.strict, self.discipline = line["grace"], line["mode"] == "strict", line["discipline"]
         self.relaxed = line["wc"] == "relaxed"
@@ -139,7 +137,6 @@ class Replay:
     def _on_end(self, line: Line) -> None:
         """Nothing to do: that time has passed was seen before."""
 
-    # ------------------------------------------------------------------ requests
     def _on_request(self, line: Line) -> None:
         arc = self._asked(line)
         old = self.world.arcs.get(arc.name)
@@ -220,7 +217,6 @@ class Replay:
         if line["until"] > latest_s + self.slack_s:
             raise Malformed(f"extended to {line['until']:g}, may run until {latest_s:g}")
 
-    # ------------------------------------------------------------------ runs
     def _on_connect(self, line: Line) -> None:
         arc = self._arc(line, Phase.WAITING)
         holding.connects(self, arc)

@@ -18,7 +18,6 @@ class Starts:
         self._replay = replay
         self._world = replay.world
 
-    # ------------------------------------------------------------------ a start
     def connects(self, arc: Arc) -> None:
         """Report each waiting ARC that is entitled to start before this one and starts later because of it."""
         replay, world = self._replay, self._world
@@ -63,7 +62,6 @@ class Starts:
         else:
             replay.report("FUTILE", arc.name, f"the higher {other.name} is due at {start_s:.3f}")
 
-    # ------------------------------------------------------------------ an end
     def revokes(self, arc: Arc) -> None:
         """Report an end that no entitled ARC needs; reserve what is freed by force for the ARC it is freed for."""
         replay, world = self._replay, self._world
@@ -135,7 +133,6 @@ class Starts:
             return arc.revoke_s >= earliest_s
         return arc.phase is Phase.CONNECTING and arc.connect_s >= earliest_s
 
-    # ------------------------------------------------------------------ waits
     def time_passes(self, until_s: float) -> None:
         """Report each ARC that could start and is left waiting until this time."""
         now_s = self._replay.now_s

@@ -48,7 +48,6 @@ class World:
         """Whether its RCs are up and it would fit on them alone."""
         return all(self.rcs[rc].up and self.fits(rc, (arc,)) for rc in arc.uses)
 
-    # ------------------------------------------------------------------ who fits beside whom
     def fits(self, rc: str, arcs: Iterable[Arc]) -> bool:
         """Whether these ARCs can hold the RC at the same time."""
         together = frozenset(arcs)
@@ -86,7 +85,6 @@ class World:
         """Whether the two can never run at the same time."""
         return any(rc in other.uses and not self.fits(rc, (one, other)) for rc in one.uses)
 
-    # ------------------------------------------------------------------ groups
     def groups(self) -> list[list[Arc]]:
         """Return the groups of active ARCs, each in the order of its plan."""
         if self._groups is None:

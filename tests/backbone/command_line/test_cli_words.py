@@ -146,7 +146,6 @@ def test_the_commands_of_the_tree_are_told_whole_and_a_file_that_cannot_be_read_
     assert CliRunner().invoke(app, ["tree", "save", str(tmp_path / "x.xml")]).exit_code == 4
 
 
-# ---------------------------------------------------------------------- completion
 def component(address: str, kind: str, user: str = "") -> ComponentState:
     return ComponentState(address, kind, "base", 1, LifeState.READY, 0.0, user=user)
 

@@ -77,7 +77,6 @@ def watch(name: str, priority: int = 1, *, robot: str = "", run_s: float = 5.0, 
     return BehaviorDescription(type="watch", name=name, priority=priority, arc=arc, **more)
 
 
-# ---------------------------------------------------------------------- placement
 def test_components_spread_over_equal_hosts() -> None:
     placed = placements(mission(watch("left")))
     assert [one.name for one in placed] == ["radio", "video", "scout1", "scout2", "left", "left-capture"]
@@ -109,7 +108,6 @@ def test_children_of_a_behavior_without_a_host_do_not_start() -> None:
     assert dry.claimed[0].refused == "parent has no host, so no ARC is asked for"
 
 
-# ---------------------------------------------------------------------- schedule
 def test_two_behaviors_of_equal_priority_take_turns() -> None:
     dry = dry_run(mission(watch("left", robot="scout1"), watch("right", robot="scout2")), 60.0)
     assert dry.can_come_up
@@ -215,7 +213,6 @@ def test_the_last_branch_is_tried_by_itself_and_must_find_what_it_needs() -> Non
     assert "last branch evening, which runs at the end: dry run, 20 s" in console.file.getvalue()
 
 
-# ---------------------------------------------------------------------- the picture
 def test_bars_show_turns_switches_and_who_shares() -> None:
     dry = dry_run(mission(watch("left", robot="scout1"), watch("right", robot="scout2")), 60.0)
     seen = bars(dry, {"left-capture": "A", "right-capture": "B"})
@@ -235,7 +232,6 @@ def test_the_screen_names_who_never_runs_and_what_would_change_it() -> None:
     assert "what would change it: high-capture releases" in text
 
 
-# ---------------------------------------------------------------------- the command
 @pytest.fixture
 def check() -> Callable[..., Any]:
     return lambda *words: CliRunner().invoke(app, ["check", str(MISSION_XML), *map(str, words)])

@@ -33,7 +33,6 @@ def finished_event(status: str = "success", where: str = AT) -> StoryEvent:
     return StoryEvent(1.0, where, f"finished: {status}", "home", "", LogLevel.NOTICE)
 
 
-# ---------------------------------------------------------------------- the decision
 def test_behaviors_end_before_it_and_what_it_sees_with_does_not() -> None:
     kinds = {"patrol": Subsystem.MISSION_CONTROL, "execution_unit": Subsystem.MISSION_CONTROL}
     kinds["scout"] = Subsystem.RESOURCE_POOL
@@ -126,7 +125,6 @@ def test_its_root_is_told_that_it_is_the_last() -> None:
     assert last_order(msgspec.structs.replace(mission, last=None)) is None
 
 
-# ---------------------------------------------------------------------- the run, in virtual time
 async def stays() -> str:
     await asyncio.Event().wait()
     raise AssertionError

@@ -164,7 +164,6 @@ def test_a_fault_in_a_branch_is_named_where_its_own_file_has_it() -> None:
     assert str(emptied.invalid(invalid.value.faults)).startswith("m.xml:8:7: ")
 
 
-# ---------------------------------------------------------------------- what follows
 class Running:
     """The processes of a mission in which everything runs: each new one gets a number."""
 

@@ -59,7 +59,6 @@ def comments(data: bytes) -> list[bytes]:
     return sorted(b" ".join(comment.split()) for comment in COMMENT.findall(data))
 
 
-# ---------------------------------------------------------------------- laws
 TEXTS = st.sampled_from([MISSION, SMALL, SMALL.replace(b"\n", b"\r\n"), b"\xef\xbb\xbf" + SMALL])
 VALUES = st.text(st.characters(codec="utf-8", exclude_categories=["Cs", "Cc"]), max_size=8) | st.sampled_from(
     ["\"'<>&", "a\nb\tc\rd", "]]>", "--", "ü" * 40]
@@ -155,7 +154,6 @@ def test_what_is_no_xml_is_refused_as_the_reader_refuses_it(data: bytes) -> None
         outline(data)
 
 
-# ---------------------------------------------------------------------- how it looks
 def test_a_value_changes_between_its_own_quotes_and_nothing_else() -> None:
     text = set_attribute(SMALL, (0, 0), "name", 'it\'s <a> "b"')
     assert text == SMALL.replace(b"name='a'", b"name='it&apos;s &lt;a> \"b\"'")
@@ -226,7 +224,6 @@ def test_line_breaks_inside_a_value_do_not_move_with_it() -> None:
     assert b"of the parameter" in deeper
 
 
-# ---------------------------------------------------------------------- refusals
 @pytest.mark.parametrize(
     ("change", "told"),
     [

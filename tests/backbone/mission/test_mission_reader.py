@@ -33,7 +33,6 @@ from backbone.naming import MAX_NAME_LENGTH
 EXAMPLES = MISSION_XML.parent / "docs" / "examples"
 
 
-# ---------------------------------------------------------------------- broken files
 @pytest.mark.parametrize("path", BROKEN, ids=lambda path: path.stem)
 def test_every_fault_of_a_broken_file_is_told_with_its_place(path: Path) -> None:
     assert [f"{fault.line}:{fault.column}: {fault.message}" for fault in faults_of_broken(path)] == announced(path)
@@ -65,7 +64,6 @@ def test_every_message_is_one_that_was_read_and_found_good() -> None:
     assert messages() == json.loads(MESSAGES.read_text())
 
 
-# ---------------------------------------------------------------------- files that are no mission at all
 def test_a_file_that_is_not_there_is_a_fault(tmp_path: Path) -> None:
     [fault] = faults_of(tmp_path / "nowhere.xml")
     assert (fault.line, fault.column) == (1, 1)
@@ -160,7 +158,6 @@ def test_a_number_that_is_far_too_large_is_a_fault_at_its_place(name: str, befor
     assert begin.count("\n") + 1 in {fault.line for fault in refused.value.faults}
 
 
-# ---------------------------------------------------------------------- places
 def test_columns_count_characters_not_bytes(tmp_path: Path) -> None:
     [fault] = faults_in(tmp_path, changed(('<host name="base"', '<!-- äöü€ --><host nam="base"'), ("<!-- A", "<!-- Ä")))
     line = changed(('<host name="base"', '<!-- äöü€ --><host nam="base"')).splitlines()[fault.line - 1]
@@ -173,7 +170,6 @@ def test_an_attribute_is_found_though_another_value_looks_like_it(tmp_path: Path
     assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith("name='no name'")
 
 
-# ---------------------------------------------------------------------- what a good file says
 def test_core_services_come_in_the_papers_order_whatever_order_they_are_written_in(tmp_path: Path) -> None:
     services = re.findall(r"    <service .*\n", SMALL.read_text())
     description = read_text(tmp_path, changed(("".join(services), "".join(reversed(services)))))
@@ -330,10 +326,6 @@ def test_an_arc_whose_name_would_be_too_long_is_refused(tmp_path: Path) -> None:
     assert "too long" in fault.message
 
 
-# ---------------------------------------------------------------------- the mission at the top of the project
-
-
-# ---------------------------------------------------------------------- the branch that runs at the end
 def test_the_last_branch_is_none_of_the_roots_that_start_with_the_mission() -> None:
     mission = read_mission(HERE.parents[2] / "docs" / "examples" / "home-at-the-end.xml")
     assert [order.name for order in behavior_orders(mission)] == ["patrol"]

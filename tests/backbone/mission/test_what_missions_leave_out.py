@@ -14,7 +14,6 @@ from backbone.mission.shipped_types import shipped_text, shipped_types
 from backbone.mission.tables import CORE_SERVICES
 from scout_model.description import WorldDescription
 
-# ---------------------------------------------------------------------- what need not be written
 MINIMAL = '<mission name="m" priority="1"/>'
 
 

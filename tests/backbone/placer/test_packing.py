@@ -67,7 +67,6 @@ def test_of_equal_packs_the_first_is_joined() -> None:
     assert pack([], 3) == "packed--1"
 
 
-# ---------------------------------------------------------------------- many of one type
 MOST = {"watcher": 3, "capture": 16, "world": 1}
 
 

@@ -145,7 +145,6 @@ def test_a_damaged_recording_is_refused() -> None:
     assert "record recover" in refused.value.remedy
 
 
-# ---------------------------------------------------------------------- clocks
 def two_hosts(far_s: float, count: int = 20) -> tuple[list[Said], list[Said]]:
     """Return what was sent on base and on a host whose clock is so far ahead: each asks the other in turn."""
     states = [

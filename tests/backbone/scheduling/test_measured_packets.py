@@ -59,7 +59,6 @@ def revoked(bench: Bench) -> list[tuple[float, str, str]]:
     return [(at_s, one.arc, one.why) for at_s, one in bench.instructions if isinstance(one, RevokeArc)]
 
 
-# ---------------------------------------------------------------------- examples: slices of 5 s, 0.1 s periods
 def test_a_newcomer_that_fits_only_by_what_was_declared_waits_for_the_slice_of_who_declared_too_little():
     bench = Bench(manager(), sharable("r"))
     bench.tell(ask("a", {"r": load(0.4)}))
@@ -236,7 +235,6 @@ def test_who_does_not_fit_even_alone_runs_once_it_is_claimed_anew_as_why_says():
     assert bench.runs("a") == [(0.0, 1.0), (10.0, None)]
 
 
-# ---------------------------------------------------------------------- laws
 class Watched:
     """A schedule manager of which is worked out after each event, from outside, whether all packets are in time."""
 

@@ -23,7 +23,6 @@ seeds = st.integers(0, 2**32)
 Way = tuple[str, ...]
 
 
-# ---------------------------------------------------------------------- the tree
 class PlainTree:
     """A plain behavior tree: each node has a parent and a number."""
 
@@ -113,7 +112,6 @@ def test_a_node_that_asks_below_a_moved_one_for_the_first_time_stands_below_it()
     assert higher(tree.path(("m", "b", "n")), tree.path(names))
 
 
-# ---------------------------------------------------------------------- the schedule
 def two_branches(**rules: Any) -> Bench:
     """Return a mission in which a low branch and a high one each have an ARC for the same RC."""
     bench = Bench(manager(**rules), unit("v"))

@@ -190,7 +190,6 @@ def test_they_agree_on_ten_thousand_traces() -> None:
     assert [one for found in results for one in found] == []
 
 
-# ---------------------------------------------------------------------- where they differ
 def a_sound_trace() -> list[Line]:
     return sound_trace(0)
 

@@ -22,7 +22,6 @@ from backbone.placer.messages import Ended, NoHost, StopComponent
 from mission_control.messages import BehaviorStatus
 
 
-# ---------------------------------------------------------------------- whole branches
 def test_a_late_patrol_is_followed_by_the_way_home_and_that_by_hiding(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         patrol = node("timeout", "one-minute", node("leaf", "patrol", arc=ARC), seconds=60.0)
@@ -235,7 +234,6 @@ def test_a_parameter_changed_at_work_counts_at_once(placer_world: Run) -> None:
     placer_world(scene)
 
 
-# ---------------------------------------------------------------------- lost messages, restarted parents
 def test_a_parent_that_missed_a_suspension_hears_of_it_when_it_is_back(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         await root(placer, node("timeout", "one-minute", node("leaf", "patrol", arc=ARC), seconds=60.0))

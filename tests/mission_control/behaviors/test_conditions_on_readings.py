@@ -96,7 +96,6 @@ def play(local_mission: Any) -> Play:
     return run
 
 
-# ---------------------------------------------------------------------- on the local bus
 @pytest.mark.parametrize(
     ("charge", "outcome"),
     [
@@ -184,7 +183,6 @@ def test_readings_have_one_source_in_the_resource_pool(source: str) -> None:
         MessageConditionParameters(message="Readings", source=source)
 
 
-# ---------------------------------------------------------------------- in the mission file
 @pytest.mark.parametrize(
     ("right", "wrong", "fault"),
     [
@@ -217,7 +215,6 @@ def test_a_condition_on_what_no_rc_reports_is_a_fault_with_its_line(
     assert (only.message, only.line) == (fault, before.count("\n") + 1)
 
 
-# ---------------------------------------------------------------------- the example
 def _battery_mission(folder: Path, seed: int) -> MissionDescription:
     """Return the example with another room, another beginning and another battery."""
     chance = random.Random(seed)

@@ -43,7 +43,6 @@ def test_what_is_no_value_is_refused_with_a_remedy(text: str) -> None:
         GiveParameters(word="look", values=text)
 
 
-# ---------------------------------------------------------------------- at work
 TEAM = EXAMPLES / "team.xml"
 WORLD = "resource_pool/world"
 LOOK_RAD, LIFTED_M = 0.6, 0.08

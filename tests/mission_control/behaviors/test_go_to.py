@@ -210,7 +210,6 @@ async def set_parameter(running: RunningMission, name: str, parameter: str, valu
     await running.bus.ask(f"mission_control/{name}", SetParameter(parameter, value), Parameters, within_s=1.0)
 
 
-# ---------------------------------------------------------------------- home
 def test_a_scout_that_was_driven_away_returns_to_where_it_stood_first() -> None:
     async def scene() -> None:
         person = Person()
@@ -243,7 +242,6 @@ def test_the_example_goes_out_and_comes_home() -> None:
     run_virtual(scene())
 
 
-# ---------------------------------------------------------------------- following
 async def distance_m(running: RunningMission) -> float:
     target = await pose(running, ROBOT)
     return away_m(await pose(running, "scout2"), (target.x_m, target.y_m))
@@ -307,7 +305,6 @@ def test_a_new_target_is_named_and_the_robot_itself_ends_it() -> None:
     run_virtual(scene())
 
 
-# ---------------------------------------------------------------------- parameters
 @pytest.mark.parametrize(
     ("kind", "given", "complaint"),
     [

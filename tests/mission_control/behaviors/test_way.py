@@ -129,7 +129,6 @@ def test_a_place_that_is_reached_in_the_last_moment_is_reached() -> None:
     assert (one.is_there, one.failure) == (True, "")
 
 
-# ---------------------------------------------------------------------- following
 def following(position: Position, target: FloorPoint, distance_m: float) -> Motion:
     return keep_distance(position, target, distance_m, speed_m_s=0.2, tolerance_m=0.1 * distance_m)
 

@@ -261,7 +261,6 @@ def test_a_module_that_ends_the_process_only_ends_its_exchange(ending: BaseExcep
     assert exchange.cause.startswith(type(ending).__name__)
 
 
-# ---------------------------------------------------------------------- state
 def test_state_is_copied_because_both_run() -> None:
     old, new = Tally(), Tally()
     old.update(old.Inputs(Number(1.0)))

@@ -137,7 +137,6 @@ def test_the_example_is_sound() -> None:
     assert_each_gets_its_turn(TOP / "docs/examples/cameras.xml")
 
 
-# ---------------------------------------------------------------------- its program alone
 def run_for(camera: PanCamera, begin_s: float, seconds: float, repeated: bytes = b"") -> float:
     """Let time pass frame by frame; return where it looks."""
     for frame in range(round(seconds * FRAMES_PER_S)):

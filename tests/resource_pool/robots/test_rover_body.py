@@ -57,7 +57,6 @@ def place_of_the_box_m(room: World) -> tuple[float, float, float]:
     return float(x_m), float(y_m), float(z_m)
 
 
-# ---------------------------------------------------------------------- body
 def test_the_body_has_the_data_sheets_size_and_mass() -> None:
     model = mujoco.MjModel.from_xml_string(world().mjcf)
     assert model.body("rover1/body").subtreemass[0] == pytest.approx(9.0)
@@ -83,7 +82,6 @@ def test_the_model_holds_the_numbers_of_the_program() -> None:
         assert math.degrees(math.atan2(axes[5], axes[2])) == pytest.approx(heading_deg, abs=1e-3)
 
 
-# ---------------------------------------------------------------------- driving
 def test_it_drives_straight_as_far_as_its_encoders_say_and_sleeps_when_it_stands() -> None:
     room = world()
     go(room, 2.0, MovePacket(0.5, 0.0))
@@ -144,7 +142,6 @@ def test_the_same_packets_give_the_same_state() -> None:
     assert states[0] == states[1]
 
 
-# ---------------------------------------------------------------------- senses
 @pytest.mark.parametrize("to_the_wall_m", [3.0, 1.2, 0.4])
 def test_each_sonar_measures_the_way_to_the_wall_it_looks_at(to_the_wall_m: float) -> None:
     room = world(x_m=9.0 - to_the_wall_m)
@@ -201,7 +198,6 @@ def test_the_accelerometer_reads_speeding_up_braking_and_the_pull_of_a_curve() -
     assert told(room).acceleration_m_s2 == pytest.approx((0.0, 0.0), abs=0.05)
 
 
-# ---------------------------------------------------------------------- bumpers
 @pytest.mark.parametrize("speed_m_s", [0.2, 0.5, 1.5])
 def test_a_wall_presses_its_bumpers_and_stops_it_until_it_backs_off(speed_m_s: float) -> None:
     room, edge_m = world(x_m=7.0), 9.0
@@ -238,7 +234,6 @@ def test_backing_into_a_wall_presses_the_rear_bumper_only() -> None:
     assert room.pose("rover1")[0] == pytest.approx(0.26, abs=0.01)
 
 
-# ---------------------------------------------------------------------- gripper
 def test_it_grips_a_box_lifts_it_carries_it_and_sets_it_down() -> None:
     room = world(thing=BOX_ON_THE_FLOOR)
     go(room, 2.0, MovePacket(0.18, 0.0))
@@ -269,7 +264,6 @@ def test_an_empty_gripper_closes_lifts_and_holds_nothing() -> None:
     assert told(room).sonars_cm[3:5] == (500, 500)
 
 
-# ---------------------------------------------------------------------- beside others
 def test_beside_a_scout_each_hears_its_own_packets_and_answers_in_its_own_words() -> None:
     room = world()
     for frame in range(60):

@@ -88,7 +88,6 @@ async def gripper(pool: Pool) -> tuple[float, float]:
     return paddles_m / PADDLES_M, lift_m / LIFT_M
 
 
-# ---------------------------------------------------------------------- what it does
 def test_it_moves_as_commanded(local_mission: Any) -> None:
     async def scene(pool: Pool, arc: ArcClient) -> None:
         assert (await arc.move(0.5, 0.25)).values == {"forward_m_s": 0.5, "turn_rad_s": 0.25}
@@ -167,7 +166,6 @@ def test_it_has_no_command_of_a_scout(local_mission: Any) -> None:
     play(local_mission, scene)
 
 
-# ---------------------------------------------------------------------- what stops it
 def test_silence_stops_it(local_mission: Any) -> None:
     async def scene(pool: Pool, arc: ArcClient) -> None:
         await move_for(pool, arc, 1.0, 0.5)
@@ -232,7 +230,6 @@ def test_a_stop_without_a_holder_is_not_confirmed_while_the_gripper_may_still_mo
     play(local_mission, scene)
 
 
-# ---------------------------------------------------------------------- beside a Scout
 def test_a_scout_and_a_rover_share_one_radio(local_mission: Any) -> None:
     async def scene(pool: Pool, arc: ArcClient) -> None:
         scout = await pool.arc(await pool.owner("other"), "drive", "scout1")
@@ -268,7 +265,6 @@ def test_its_video_is_captured_under_its_own_kind_of_arc(local_mission: Any) -> 
     run_virtual(main())
 
 
-# ---------------------------------------------------------------------- what consoles draw
 def test_its_abilities_have_the_limits_of_its_body() -> None:
     abilities = RoverRc.abilities()
     forms = {form.word: form for form in abilities.commands}

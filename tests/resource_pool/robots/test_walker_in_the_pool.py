@@ -29,7 +29,6 @@ from scout_model.radio_link import HaltPacket, Safe, TransmitterOn
 EVERYTHING = ["walker1", "scout1", "radio", "video", "grabber"]
 
 
-# ---------------------------------------------------------------------- what it does
 def test_it_walks_as_commanded_then_turns_then_stands(local_mission: Any) -> None:
     async def scene(pool: Pool, arc: ArcClient, trunk: Trunk) -> None:
         assert (await arc.move(0.3)).values == {"forward_m_s": 0.3, "turn_rad_s": 0.0}
@@ -135,7 +134,6 @@ def test_its_readings_have_the_state_of_its_motion_with_each_protocol(local_miss
     play(local_mission, scene)
 
 
-# ---------------------------------------------------------------------- at its rate, beside a Scout
 class SlowRadio(CommandRadio):
     """Answers later than a step lasts."""
 

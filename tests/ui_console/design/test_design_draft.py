@@ -70,7 +70,6 @@ def watchers() -> Draft:
     return draft
 
 
-# ---------------------------------------------------------------------- laws
 NAMES = st.sampled_from(["scout1", "scout9", "radio", "world", "watch-scout1", "base", "Not Legal", ""])
 START = st.sampled_from([*(Draft.opened(str(file)) for file in SHIPPED), Draft.new("new.xml")])
 
@@ -178,7 +177,6 @@ def test_a_problem_is_about_the_element_it_stands_in() -> None:
         assert text.splitlines()[fault.line - 1].decode()[fault.column - 1 :].startswith("x-m=")
 
 
-# ---------------------------------------------------------------------- building
 def test_a_new_mission_is_fine_and_named_as_its_file() -> None:
     assert Draft.new("night-watch.xml").mission.text("name") == "night-watch"
     assert Draft.new("Ünlawful name.xml").mission.text("name") == "mission"

@@ -50,7 +50,6 @@ def done(draft: Draft, change: Change) -> Draft | Refusal:
         return refusal
 
 
-# ---------------------------------------------------------------------- laws
 @settings(max_examples=share(30), suppress_health_check=list(HealthCheck))
 @given(START, st.data())
 def test_whatever_pages_ask_for_can_be_read_and_shown_and_taken_back(draft: Draft, data: st.DataObject) -> None:
@@ -103,7 +102,6 @@ def test_every_part_of_the_palette_goes_somewhere_or_asks_or_says_where_it_belon
         assert after is draft or after.mission.at(after.step.touched).tag == row.tag
 
 
-# ---------------------------------------------------------------------- cases
 def test_a_wish_let_go_of_on_a_behavior_goes_into_its_arc_and_asks_which() -> None:
     draft = tutorial_draft()
     watcher = element(draft, "behavior", "watch-scout1")

@@ -40,7 +40,6 @@ def names(folder: Path) -> set[str]:
     return {one.name for one in folder.iterdir()}
 
 
-# ---------------------------------------------------------------------- designing together
 async def test_two_designers_see_one_draft_and_each_has_a_cursor(file: Path) -> None:
     async with serving(file) as served, served.page() as anna, served.page(BEN) as ben:
         await anna.wait(lambda: anna.view["people"] == ["anna", "ben"], "ben came")
@@ -216,7 +215,6 @@ async def test_a_value_may_be_as_long_as_a_message_and_so_may_a_wrong_name_of_a_
         assert "is no name of a mission file" in refused["refused"]
 
 
-# ---------------------------------------------------------------------- who is kept out
 @pytest.mark.parametrize(
     ("first", "words"),
     [

@@ -19,7 +19,6 @@ from ui_console.design.file import FileChanged, NotSaved, save
 from ui_console.design.views import element_view, problems_view, tree_view
 
 
-# ---------------------------------------------------------------------- files
 def test_an_opened_file_is_saved_to_the_byte(tmp_path: Path) -> None:
     file = tmp_path / "mission.xml"
     file.write_bytes(SHIPPED[0].read_bytes())
@@ -66,7 +65,6 @@ def test_what_is_no_xml_is_told_as_check_tells_it(tmp_path: Path) -> None:
         Draft.opened(str(file))
 
 
-# ---------------------------------------------------------------------- files with faults
 WORDS = st.sampled_from(
     [b"behavior", b"scout1", b"name=", b"type=", b"5", b"world", b"uses", b"arc", b"capture", b"/>"]
 )

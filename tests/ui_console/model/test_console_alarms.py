@@ -131,7 +131,6 @@ def test_a_real_alarm_never_fades() -> None:
     assert book.views()
 
 
-# ---------------------------------------------------------------------- one cause, one line
 NEEDS = {
     "scout1": frozenset({"creator-base"}),
     "scout2": frozenset({"creator-base"}),
@@ -206,7 +205,6 @@ def test_whatever_explains_whatever_every_alarm_is_told_exactly_once(
     assert sorted(key for view in views for key in view.keys) == sorted(view.key for view in book.views())
 
 
-# ---------------------------------------------------------------------- ordinary use
 def test_five_minutes_of_ordinary_use_are_few_alarms_and_in_the_end_none() -> None:
     """Take over, drive, stop and lift, a robot that dies and comes back, colleagues who come and go, all day's work."""
     fell = ProcessFell("scout1", "killed by SIGKILL", 0.05, ["last words"])

@@ -48,7 +48,6 @@ from ui_console.model.orders import GivenOrder, Order, OrderKind, OrderState
 from ui_console.model.views import AlarmKind, NodeState, Severity, view_json
 
 
-# ---------------------------------------------------------------------- robots and requests
 def test_the_robot_table_says_who_holds_what_since_when_until_when_and_who_waits() -> None:
     held, free = model(Heard(8.0, SCHEDULE)).robots(8.0)
     assert [(row.number, row.robot) for row in (held, free)] == [(1, "scout1"), (2, "scout2")]
@@ -90,7 +89,6 @@ def test_requests_come_running_first_then_by_predicted_start() -> None:
     assert rows[0].because == "its turn"
 
 
-# ---------------------------------------------------------------------- the behavior tree
 def test_the_tree_puts_children_below_their_parents_with_priority_state_and_feedback() -> None:
     nodes = model(*TEAM_EVENTS).team.tree()
     assert [(n.depth, n.name, n.priority, n.parent) for n in nodes] == [
@@ -137,7 +135,6 @@ def test_every_behavior_is_in_the_tree_once_whoever_claims_to_have_started_it(pa
     assert all(node.depth == depths.get(node.parent, -1) + 1 for node in nodes)
 
 
-# ---------------------------------------------------------------------- this console's own
 def test_the_status_line_follows_a_take_over_from_wish_to_release() -> None:
     shown = model()
     assert shown.status_line(9.0) == "watching; you hold no robot"
@@ -177,7 +174,6 @@ def test_a_round_trip_of_commands_is_among_the_links() -> None:
     assert [(link.name, link.latency_s) for link in shown.links(1.0)] == [("hub", 0.002), ("commands to scout1", 0.004)]
 
 
-# ---------------------------------------------------------------------- parameters and the log
 def test_a_parameter_that_was_changed_says_what_it_was_and_who_changed_it() -> None:
     at = "mission_control/watch1"
     shown = model(
@@ -204,7 +200,6 @@ def test_consoles_that_share_a_team_see_the_same_mission_and_hold_robots_of_thei
     assert not one.robots(8.0)[0].is_mine
 
 
-# ---------------------------------------------------------------------- all of it
 def test_a_view_is_json_and_comes_back_as_it_was() -> None:
     view = held_model().view(12.0)
     assert msgspec.json.decode(view_json(view)) == msgspec.to_builtins(plain(view))

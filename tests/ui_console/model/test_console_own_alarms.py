@@ -43,7 +43,6 @@ def alarm_lines(shown: ConsoleModel, now_s: float = 50.0) -> list[str]:
     return [alarm.line for alarm in shown.alarm_views()]
 
 
-# ---------------------------------------------------------------------- alarms
 def test_pictures_that_stay_away_or_grow_old_are_an_alarm_until_they_come_again() -> None:
     shown = model(GRANT)
     assert alarm_lines(shown, 10.0 + SILENT_S) == []

@@ -24,7 +24,6 @@ from ui_console.model.events import (
 )
 
 
-# ---------------------------------------------------------------------- events as JSON lines
 @pytest.mark.parametrize(
     ("event", "word", "fields"),
     [

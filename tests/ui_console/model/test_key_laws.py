@@ -35,7 +35,6 @@ BODIES = st.recursive(
 )
 
 
-# ---------------------------------------------------------------------- rates
 @settings(max_examples=share(100))
 @given(st.floats(1.0, 200.0), st.floats(1.0, 30.0), st.integers(1, 5000))
 def test_what_is_said_steadily_has_its_rate_and_size(rate_hz: float, lasts_s: float, size_bytes: int) -> None:
@@ -74,7 +73,6 @@ def test_a_flood_of_keys_pushes_out_those_that_were_silent_longest() -> None:
     assert f"a/b{MOST_KEYS + 9}/log" in keys
 
 
-# ---------------------------------------------------------------------- plots
 @settings(max_examples=share(100))
 @given(SAMPLES, st.integers(1, 300))
 def test_a_plot_has_the_least_and_most_number_of_the_span_at_any_width(
@@ -116,7 +114,6 @@ def test_what_is_no_number_and_what_is_too_old_is_not_plotted() -> None:
     assert series.newest == 1.0
 
 
-# ---------------------------------------------------------------------- messages
 @given(BODIES)
 def test_any_message_is_shown_in_rows_of_printable_text(body: object) -> None:
     rows = field_rows(body)

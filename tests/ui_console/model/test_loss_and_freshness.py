@@ -19,7 +19,6 @@ from ui_console.terminal.display import LINK_LOOK_S
 AWAY = GivenBack(20.0, "anna is away", True, wanted=False)
 
 
-# ---------------------------------------------------------------------- a robot that was lost
 def test_a_robot_given_back_unasked_is_said_to_be_lost_with_when_and_why_and_can_be_taken_again() -> None:
     shown = model(Heard(8.0, SCHEDULE), ASK, GRANT, AWAY)
     assert shown.own(21.0).lost == LostView("scout1", "anna is away", 20.0, may_retake=True)
@@ -56,7 +55,6 @@ def test_whose_turn_is_over_has_lost_nothing() -> None:
     assert model(ASK, GRANT, Heard(12.0, Suspended("arc", "slice", "console-2", -1.0))).own(12.0).lost is None
 
 
-# ---------------------------------------------------------------------- a link that is down
 WITHIN_S = 1.0
 DRAWN_S = 0.1  # of a busy machine's screen
 
@@ -98,7 +96,6 @@ def test_what_is_shown_is_never_older_than_a_second_without_saying_so(word: Link
     assert not [alarm for alarm in shown.team.alarms.views() if alarm.is_active]
 
 
-# ---------------------------------------------------------------------- stops
 def test_what_has_to_be_let_go_is_said_only_while_a_robot_is_held() -> None:
     shown = held_model()
     shown.apply(LetGoNeeded(12.0, True))

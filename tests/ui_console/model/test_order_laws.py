@@ -38,7 +38,6 @@ class Operated(RuleBasedStateMachine):
         self.wanted: set[str] = set()
         self.begun, self.removed, self.finals = Counter[int](), Counter[int](), Counter[int]()
 
-    # ------------------------------------------------------------------ the world
     def holder(self, robot: str) -> str | int:
         """The holder by rank: stick, of equal orders the one that has it already, the mission."""
         if self.has_stick and self.front == robot:
@@ -87,7 +86,6 @@ class Operated(RuleBasedStateMachine):
                 if news:
                     self.do(news)
 
-    # ------------------------------------------------------------------ the operator
     @rule(robot=A_ROBOT, then_release=st.booleans())
     def order(self, robot: str, then_release: bool) -> None:
         self.do(self.book.give(Order(OrderKind.GO_TO, robot, 1.0, 1.0, then_release=then_release)))
@@ -123,7 +121,6 @@ class Operated(RuleBasedStateMachine):
     def come_back(self) -> None:
         self.book.back()
 
-    # ------------------------------------------------------------------ what happens by itself
     @precondition(lambda self: self.starting)
     @rule(data=st.data())
     def behavior_comes_up(self, data: st.DataObject) -> None:
@@ -186,7 +183,6 @@ class Operated(RuleBasedStateMachine):
         self.book.removed(number)
         self.tell()
 
-    # ------------------------------------------------------------------ the laws
     @invariant()
     def a_robot_that_the_operator_wants_is_never_the_missions(self) -> None:
         for robot in self.wanted:

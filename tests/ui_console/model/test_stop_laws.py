@@ -83,7 +83,6 @@ class World:
         self._on_the_way: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
 
-    # ------------------------------------------------------------------ the network
     def send(self, who: Operator, act: Callable[[], None]) -> None:
         """Let the message arrive later, much later over a cut link."""
         delay_s = self.rng.uniform(0, LONGEST_DELAY_S) + (self.rng.uniform(0, CUT_S) if who.is_cut else 0.0)
@@ -109,7 +108,6 @@ class World:
             if self.rng.random() < 0.8:  # publications may get lost
                 self.send(who, lambda who=who: tell(who))
 
-    # ------------------------------------------------------------------ the robot's RC
     def _command(self, who: Operator, drive: MoveWish, epoch: int, after_stop: int) -> None:
         def arrive() -> None:
             if epoch != self.epoch or who.name != self.holder:
@@ -195,7 +193,6 @@ class World:
         state = self.latch.state
         self.tell_all(lambda one: one.hear_stop(state))
 
-    # ------------------------------------------------------------------ who holds it
     def take(self, who: Operator) -> None:
         self._hand_over(who.name)
         epoch, state = self.epoch, self.latch.state
@@ -216,7 +213,6 @@ class World:
             if one.name == former:
                 self.send(one, lambda one=one, epoch=self.epoch - 1: one.hear_loss(epoch))
 
-    # ------------------------------------------------------------------ what people do
     def do(self, who: Operator, what: str) -> None:
         match what:
             case "press":

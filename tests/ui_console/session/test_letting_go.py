@@ -22,7 +22,6 @@ from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, Give
 from ui_console.session.scripted import ScriptDriver
 
 
-# ---------------------------------------------------------------------- the law
 @given(
     st.lists(
         st.tuples(st.sampled_from(["key", "stick", "let go", "require"]), st.floats(0.01, 0.8)),
@@ -102,7 +101,6 @@ def test_a_jump_key_that_is_held_jumps_no_more_until_it_was_let_go() -> None:
     assert hand.press_once(3 * REPEAT_S + KEYS_LET_GO_S)
 
 
-# ---------------------------------------------------------------------- a console that holds a robot
 Scene = Callable[[HeldRobot], Awaitable[None]]
 
 
@@ -269,7 +267,6 @@ def test_a_robot_that_was_stopped_and_freed_before_it_is_granted_is_driven_by_th
     stage(scene)
 
 
-# ---------------------------------------------------------------------- scripts
 async def play(on: HeldRobot, lines: list[tuple[float, str | None]]) -> tuple[int, list[str]]:
     """Write these lines into the script's pipe, each after its pause; return how it ended and the words it said."""
     said: list[bytes] = []

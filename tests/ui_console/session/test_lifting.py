@@ -36,7 +36,6 @@ def stopped_by(*names: str) -> StopState:
     return latch.state
 
 
-# ---------------------------------------------------------------------- the rules
 @given(st.lists(st.sampled_from(PEOPLE), min_size=1, max_size=5), st.sampled_from(PEOPLE), st.integers(0, 6))
 def test_everybody_else_who_stopped_the_robot_is_asked_and_nobody_twice(
     stoppers: list[str], user: str, number: int
@@ -85,7 +84,6 @@ def test_who_stopped_under_no_name_is_known_by_the_console() -> None:
     assert decide_lift(stop.state, 1, "anna", "ui_console/x") == AskFirst((Stopper(*["ui_console/console-7"] * 2),))
 
 
-# ---------------------------------------------------------------------- three people at consoles that only watch
 class Person:
     """A person at a console, and the content of its screens."""
 

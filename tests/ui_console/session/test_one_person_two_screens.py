@@ -31,7 +31,6 @@ from ui_console.session.teleoperation import Teleoperation
 TIMES = st.floats(0, 100)
 
 
-# ---------------------------------------------------------------------- the rule
 @given(TIMES, TIMES)
 def test_of_two_claims_of_one_person_the_newer_stands_and_never_both(one_s: float, other_s: float) -> None:
     first = decide(AskHandOver("scout1", "anna", one_s), "anna", "scout1", other_s, by_script=False)
@@ -56,7 +55,6 @@ def test_what_another_person_or_a_script_holds_stays_there(user: str, holds: str
     assert decide(asked, user, holds, 1.0, by_script=by_script) is ClaimOutcome.NOT_YOURS
 
 
-# ---------------------------------------------------------------------- over the bus
 class RcManager(Component[NoParameters]):
     """Answers with the holder of scout1."""
 
@@ -169,7 +167,6 @@ def test_another_persons_robot_stays_with_them(stage: Callable[[Scene], None]) -
     stage(scene)
 
 
-# ---------------------------------------------------------------------- on the screens
 DESK = component("ui_console/console-1", "console", feedback="holds no robot")
 
 

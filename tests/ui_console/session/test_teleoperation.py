@@ -150,7 +150,6 @@ def test_a_command_without_an_answer_is_told_as_such(placer_world: Any, beside: 
     placer_world(scene)
 
 
-# ---------------------------------------------------------------------- another robot, nobody there, a pad
 def test_switching_gives_the_first_robot_back_before_the_other_is_asked_for(placer_world: Any, beside: Any) -> None:
     async def scene(placer: FakePlacer) -> None:
         events: list[ConsoleEvent] = []

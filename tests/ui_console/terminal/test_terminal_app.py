@@ -122,7 +122,6 @@ async def test_leaving_the_window_stops_the_wheels_and_coming_back_is_noticed() 
     assert session.touched == 1
 
 
-# ---------------------------------------------------------------------- emergency stop
 async def test_without_a_robot_of_ones_own_the_stop_is_for_the_row_the_cursor_is_on() -> None:
     session = WrittenSession(Heard(8.0, SCHEDULE))
     async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
@@ -155,7 +154,6 @@ async def test_a_stop_nobody_confirmed_is_said_aloud(key: str, said: str) -> Non
         assert said in screen_text(pilot.app)
 
 
-# ---------------------------------------------------------------------- the drag pad
 async def test_dragging_in_the_pad_drives_until_it_is_let_go() -> None:
     session = WrittenSession()
     screen = ConsoleApp(session)
@@ -228,7 +226,6 @@ async def test_keys_and_pad_drive_within_the_reach_of_the_body_and_not_at_all_wi
         assert "speed" not in screen_text(screen).splitlines()[0]
 
 
-# ---------------------------------------------------------------------- profiles
 async def test_a_monitor_has_no_keys_that_drive() -> None:
     session = WrittenSession()
     async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:

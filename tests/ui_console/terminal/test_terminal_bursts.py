@@ -72,7 +72,6 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(display, "MONITOR_EVERY_S", QUIET_S)
 
 
-# ---------------------------------------------------------------------- what was seen to end a console
 @pytest.mark.usefixtures("quiet")
 @pytest.mark.parametrize("name", some(name for name in CONSOLE_SCREENS if name not in NO_DIALOGS))
 async def test_a_dialog_is_answered_once_however_fast_its_key_comes_twice(name: str) -> None:
@@ -130,7 +129,6 @@ async def test_a_key_that_arrives_together_with_the_escape_before_it_still_leave
     assert app.return_code == LEAVE["q"]
 
 
-# ---------------------------------------------------------------------- every key
 @pytest.mark.slow
 @pytest.mark.usefixtures("quiet")
 @pytest.mark.timeout(600)

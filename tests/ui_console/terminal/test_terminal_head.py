@@ -110,7 +110,6 @@ def test_robots_that_others_stopped_are_on_the_first_line_of_every_console() -> 
         assert "STOPPED: scout1" in shown_at(shown.view(NOW_S), 80, profile).status.plain
 
 
-# ---------------------------------------------------------------------- the last line
 @pytest.mark.parametrize("profile", list(Profile))
 @pytest.mark.parametrize("columns", WIDTHS)
 def test_the_last_line_fits_and_always_names_the_keys_that_stop(profile: Profile, columns: int) -> None:

@@ -25,7 +25,6 @@ from ui_console.terminal.tables import PanelName
 from ui_console.terminal.widgets import Video
 
 
-# ---------------------------------------------------------------------- no link, and a robot that was lost
 @pytest.mark.parametrize("profile", list(Profile))
 async def test_a_console_without_a_link_says_across_the_screen_that_it_stops_nothing(profile: Profile) -> None:
     session = WrittenSession(shown=held_model())
@@ -59,7 +58,6 @@ async def test_a_robot_that_was_lost_is_taken_again_by_one_key_or_known_to_be_lo
         assert "you lost" not in screen_text(app)
 
 
-# ---------------------------------------------------------------------- the picture
 async def test_the_screen_shows_picture_holder_and_status() -> None:
     session = WrittenSession(shown=held_model())
     session.shown = np.tile(np.arange(0, 240, 6, dtype=np.uint8), (30, 1))
@@ -116,7 +114,6 @@ async def test_a_robot_that_was_taken_away_says_by_whom_across_the_picture() -> 
         assert "console-2 has the higher priority" in video.render_line(video.size.height // 2).text
 
 
-# ---------------------------------------------------------------------- every screen as it was when somebody looked
 ALARMING: list[ConsoleEvent] = [
     Attention(8.0, False),
     LinkTrouble(9.0, "nobody answers at resource_pool/scout2"),

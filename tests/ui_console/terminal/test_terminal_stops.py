@@ -57,7 +57,6 @@ async def opened(pilot: Pilot[None], name: str) -> None:
     await settle(pilot)
 
 
-# ---------------------------------------------------------------------- everywhere
 STOP_ONE, STOP_ALL = ("stop robot", "scout1"), "stop all"
 STOPPING = {"x": STOP_ONE, "X": STOP_ALL, "alt+x": STOP_ONE, "shift+x": STOP_ALL, "alt+shift+x": STOP_ALL}
 
@@ -108,7 +107,6 @@ async def test_a_text_may_hold_an_x_all_the_same() -> None:
     assert session.wanted == [("may I", "next")]
 
 
-# ---------------------------------------------------------------------- only ever stops
 @pytest.mark.parametrize("name", some(DIALOGS))
 async def test_a_stop_pressed_twice_lifts_nothing(name: str) -> None:
     session = WrittenSession(shown=stopped_model())
@@ -274,7 +272,6 @@ def test_lifting_is_for_the_row_then_for_the_robot_in_hand_and_only_for_stopped_
     assert stop_meant(["scout3", "scout5"], **at_hand) == ""
 
 
-# ---------------------------------------------------------------------- a fresh press
 async def test_what_is_held_down_must_be_let_go_when_a_dialog_opens_and_when_it_closes() -> None:
     session = WrittenSession(shown=stopped_model())
     async with ConsoleApp(session).run_test(size=SIZE) as pilot:

@@ -25,7 +25,6 @@ from ui_console.terminal.tables import PanelName
 from ui_console.terminal.widgets import Panel, Video
 
 
-# ---------------------------------------------------------------------- robots, tables, dialogs
 async def test_the_picker_takes_the_robot_chosen_and_escape_takes_none() -> None:
     session = WrittenSession(Heard(8.0, SCHEDULE))
     async with ConsoleApp(session).run_test(size=SIZE) as pilot:

@@ -210,7 +210,6 @@ def test_a_crowd_is_told_once_with_its_address() -> None:
     at_server(visit, encrypted=False, loop="asyncio")
 
 
-# ---------------------------------------------------------------------- who makes room
 def test_of_an_address_the_oldest_silent_one_makes_room_before_any_that_asked() -> None:
     pending: PendingClients[int] = PendingClients()
     assert [pending.came(who, "a") for who in range(MOST_OF_AN_ADDRESS)] == [None] * MOST_OF_AN_ADDRESS
