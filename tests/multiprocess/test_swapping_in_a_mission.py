@@ -77,7 +77,7 @@ def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A module's file that the mission can import, and this process, too."""
     file = tmp_path / f"{FILE}.py"
     file.write_text(SOURCE)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     monkeypatch.syspath_prepend(tmp_path)
     yield file
     sys.modules.pop(FILE, None)
