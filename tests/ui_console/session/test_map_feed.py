@@ -165,6 +165,6 @@ def test_a_component_whose_last_state_comes_after_its_disappearance_is_not_kept(
             state = ComponentState(f"ui_console/left-late-{number}", "console", "base", number, LifeState.READY, 0.0)
             for said in (state, Disappeared(state.address), replace(state, state=LifeState.STOPPED)):
                 feed.heard(said)
-        assert not [one for one in gc.get_objects() if isinstance(one, dict) and "ui_console/left-late-7" in one]
+        assert not [one for one in gc.get_objects() if issubclass(type(one), dict) and "ui_console/left-late-7" in one]
 
     run_virtual(main())
