@@ -3,7 +3,7 @@
 * Thousands of tests and all their modules are half a million objects, and live to the end of the run: a full garbage
   collection visits each in vain. None runs while they are made, and afterwards they are frozen.
 * A message at its limits and a screen with its styles are hundreds of thousands of objects that live for one test.
-  With Python's own thresholds a third of some files' processor time was full collections of them.
+  With Python's own thresholds, full collections took a tenth of the quick run's processor time (measured).
 """
 
 from __future__ import annotations
