@@ -63,7 +63,11 @@ class Clock(Protocol):
         """Return after this many mission seconds; at least yields once."""
 
     async def sleep_until_s(self, at_s: float) -> None:
-        """Return at this mission time, at once if it has passed."""
+        """Return at this mission time, at once if it has passed.
+
+        On a real machine this may be a millisecond too early, because uvloop counts whole milliseconds. So a caller
+        must not compare the time with it afterwards.
+        """
 
 
 class Bus(Protocol):

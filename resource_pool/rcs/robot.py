@@ -263,9 +263,9 @@ class RobotRc(ResourceController[P], Generic[P]):
                 self._tell_halted(holder)
         else:
             # A former holder's last packet was a safe one, or the radio was late, or sends no more.
-            most_s = self.clock.now_s() + RADIO_REPLY_S * self.clock.rate
-            await self.clock.sleep_until_s(min(self._at_rest_s, most_s))
-            self._latch.confirm(self.clock.now_s() >= self._at_rest_s)
+            until_s = min(self._at_rest_s, self.clock.now_s() + RADIO_REPLY_S * self.clock.rate)
+            await self.clock.sleep_until_s(until_s)
+            self._latch.confirm(self._at_rest_s <= until_s)  # not the time of the clock: a wait may end a little early
             self._confirm_at_rest()
         self._publish_stop()
         if is_new:

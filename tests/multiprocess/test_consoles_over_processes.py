@@ -103,7 +103,7 @@ async def test_who_stopped_a_robot_is_asked_by_who_wants_it_to_move_and_not_once
         consoles_at_work(mission, bus, "scout3", [("ben", 90)]) as (ben,),
     ):
         async with consoles_at_work(mission, bus, "scout3", [("anna", 100)]) as (anna,):
-            await component(anna).stop_robot("scout3")  # not confirmed at once if its RC has just changed hands
+            assert await component(anna).stop_robot("scout3")
             number = (await ask_stop(bus, "scout3")).number
             lifting = asyncio.create_task(component(ben).lift_stop("scout3", number))
             sought = await anna.hears(0, Sought)
