@@ -66,7 +66,7 @@ class Clock(Protocol):
         """Return at this mission time, at once if it has passed.
 
         On a real machine this may be a millisecond too early, because uvloop counts whole milliseconds. So a caller
-        must not compare the time with it afterwards.
+        that compares the time afterwards must be ready to wait again.
         """
 
 

@@ -1,11 +1,10 @@
 """Failures: RCs and ARCs that run and cannot do their work, since when, and why.
 
-The RC manager acts on each failure at once. What people are told does not change with each packet that a link loses:
+The RC manager acts on each failure at once. The mission's health does not change with each packet that a link loses:
 
-* A failure without an answer is told after ``TOLD_AFTER_S``, or at once if it is repeated. One with a reason is told at
-  once.
-* A failure that begins again within ``WORKS_AGAIN_S`` after its end is repeated. It is told as one failure until the RC
-  or ARC has worked for so long.
+* Health names a failure with a reason, or a repeated one, at once, and one without an answer after ``NAMED_AFTER_S``.
+* A failure that begins again within ``WORKS_AGAIN_S`` after its end is repeated. Health names it as one failure until
+  the RC or ARC has worked for that time.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from backbone.bus.interface import Clock
 from backbone.component.messages import Absence
 from backbone.errors import LinkError, Refusal
 
-TOLD_AFTER_S = 1.0  # chosen: the RC was asked three times, so more than one packet was lost
+NAMED_AFTER_S = 1.0  # chosen: the RC was asked three times, so more than one packet was lost
 WORKS_AGAIN_S = 20.0  # chosen: four of the papers' 5 s slices, so an RC that is shared was connected several times
 
 Note = Callable[[str, str], object]
@@ -83,7 +82,7 @@ class Failures:
     def absences(
         self, needed: Collection[str], doing: str, remedy: Callable[[str], str] = lambda _name: ""
     ) -> list[Absence]:
-        """Return those of these RCs or ARCs that people are told to fail, sorted by name.
+        """Return the RCs or ARCs whose failure health names now, sorted by name.
 
         Args:
             needed: RCs, or ARCs, whose failure matters now.
@@ -94,12 +93,12 @@ class Failures:
         return [
             Absence(name, since_s[name], self._why(name), doing, remedy(name), is_running=True)
             for name in sorted(since_s.keys() & needed)
-            if self._is_told(name, since_s[name])
+            if self._is_named(name, since_s[name])
         ]
 
-    def _is_told(self, name: str, since_s: float) -> bool:
+    def _is_named(self, name: str, since_s: float) -> bool:
         may_be_one_packet = self.is_silent(name) and name not in self._repeated
-        return not may_be_one_packet or self._clock.now_s() - since_s >= TOLD_AFTER_S * self._clock.rate
+        return not may_be_one_packet or self._clock.now_s() - since_s >= NAMED_AFTER_S * self._clock.rate
 
     def _forget_old(self) -> None:
         long_ago_s = self._clock.now_s() - WORKS_AGAIN_S * self._clock.rate

@@ -48,7 +48,7 @@ async def cut() -> None:
 
 
 async def deaf() -> None:
-    """Wait for the bench, whoever cancels this."""
+    """Wait until the bench ends it, and ignore cancellations."""
     while not Bench.end_deaf.is_set():
         with contextlib.suppress(asyncio.CancelledError):
             await Bench.end_deaf.wait()

@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 import sys
+from types import ModuleType
 
 import pytest
 
 from backbone.command_line import cli
 from ui_console import cli as console_cli
+
+
+def complaint_of(
+    command: ModuleType, typed: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> str:
+    """Return what the command prints about these words before it ends with 2."""
+    monkeypatch.setattr(sys, "argv", typed.split())
+    monkeypatch.setattr(sys.modules["__main__"], "__package__", "")  # else the program's name begins "python -m"
+    with monkeypatch.context() as kept:
+        for commands in ("registered_commands", "registered_groups"):
+            kept.setattr(command.app, commands, list(getattr(command.app, commands)))
+        with pytest.raises(SystemExit) as ended:
+            command.main()
+    assert ended.value.code == 2
+    return capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -30,27 +46,11 @@ from ui_console import cli as console_cli
 def test_wrong_words_are_a_refusal_with_a_remedy(
     typed: str, told: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["scout-backbone", *typed.split()])
-    monkeypatch.setattr(sys.modules["__main__"], "__package__", "")  # else the program's name begins "python -m"
-    with monkeypatch.context() as kept:
-        for commands in ("registered_commands", "registered_groups"):
-            kept.setattr(cli.app, commands, list(getattr(cli.app, commands)))
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == f"refused [usage.words]: {told}\n"
+    assert complaint_of(cli, f"scout-backbone {typed}", monkeypatch, capsys) == f"refused [usage.words]: {told}\n"
 
 
 def test_faults_that_a_command_of_the_console_finds_have_the_same_form(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["scout-console", "serve", "--key", "k"])
-    monkeypatch.setattr(sys.modules["__main__"], "__package__", "")
-    with monkeypatch.context() as kept:
-        for commands in ("registered_commands", "registered_groups"):
-            kept.setattr(console_cli.app, commands, list(getattr(console_cli.app, commands)))
-        with pytest.raises(SystemExit) as ended:
-            console_cli.main()
-    assert ended.value.code == 2
-    told = "refused [usage.words]: --key belongs to a --certificate (See 'scout-console serve --help'.)"
-    assert capsys.readouterr().err.splitlines() == [told]
+    told = "refused [usage.words]: --key belongs to a --certificate (See 'scout-console serve --help'.)\n"
+    assert complaint_of(console_cli, "scout-console serve --key k", monkeypatch, capsys) == told
