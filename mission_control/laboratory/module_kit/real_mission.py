@@ -241,8 +241,10 @@ def mission_up(
             try:
                 running.wait_for_line("^all ready", READY_WITHIN_S)
                 yield running
-                launcher.terminate()  # as ``down`` would ask it, without a command that starts for it
-                launcher.wait(DOWN_WITHIN_S)
+                if launcher.poll() is None:
+                    launcher.terminate()  # as ``down`` would ask it, without a command that starts for it
+                    if code := launcher.wait(DOWN_WITHIN_S):
+                        raise AssertionError(f"'up' ended with {code} when it was asked to end")
                 left = wait_gone(mark, GONE_WITHIN_S)
                 if left:
                     raise AssertionError(f"left behind: {left}")
