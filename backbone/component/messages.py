@@ -38,6 +38,7 @@ class Absence(Message, frozen=True):
         remedy: What an operator can do; empty: no action is needed.
         vital: True if the mission cannot work without it (core services).
         is_running: True if it runs and cannot do its work.
+        is_repeated: True if it runs, and has failed again and again since that time; at this moment it may work.
     """
 
     name: Mention
@@ -47,6 +48,7 @@ class Absence(Message, frozen=True):
     remedy: Text = ""
     vital: bool = False
     is_running: bool = False
+    is_repeated: bool = False
 
 
 class Stopper(Message, frozen=True):

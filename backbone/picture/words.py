@@ -90,11 +90,12 @@ def absence_lines(absences: Iterable[Absence], now_s: float) -> list[str]:
 
 
 def _trouble(absence: Absence, now_s: float) -> str:
-    is_what = "has not worked" if absence.is_running else "is absent"
-    lasts_s = max(0.0, now_s - absence.since_s)
-    return "; ".join(
-        [f"{is_what} for {lasts_s:.1f} s: {absence.cause}", *filter(None, (absence.doing, absence.remedy))]
-    )
+    lasts = f"for {max(0.0, now_s - absence.since_s):.1f} s"
+    if absence.is_repeated:
+        trouble = f"has failed again and again {lasts}"
+    else:
+        trouble = f"{'has not worked' if absence.is_running else 'is absent'} {lasts}"
+    return "; ".join([f"{trouble}: {absence.cause}", *filter(None, (absence.doing, absence.remedy))])
 
 
 def counted_names(names: Sequence[str]) -> str:

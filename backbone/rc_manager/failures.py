@@ -91,7 +91,15 @@ class Failures:
         """
         since_s = {name: self._ended[name][0] for name in self.repeated() & self._ended.keys()} | self._since_s
         return [
-            Absence(name, since_s[name], self._why(name), doing, remedy(name), is_running=True)
+            Absence(
+                name,
+                since_s[name],
+                self._why(name),
+                doing,
+                remedy(name),
+                is_running=True,
+                is_repeated=name in self._repeated,
+            )
             for name in sorted(since_s.keys() & needed)
             if self._is_named(name, since_s[name])
         ]
@@ -108,5 +116,4 @@ class Failures:
 
     def _why(self, name: str) -> str:
         fault = self.put_aside.get(name)
-        why = f"it is put aside: {fault}" if fault else self._complaints.get(name, "")
-        return f"it fails again and again: {why}" if name in self._repeated else why
+        return f"it is put aside: {fault}" if fault else self._complaints.get(name, "")

@@ -61,10 +61,16 @@ class HealthBoard:
         """Begin an alarm for each absence, and end the alarms of components that are back."""
         for absence in absent:
             what = "; ".join(part for part in (absence.cause, absence.doing) if part)
-            line = f"{absence.name} {'does not work' if absence.is_running else 'is absent'}: {what}"
+            line = f"{absence.name} {_trouble(absence)}: {what}"
             severity = Severity.ALARM if absence.vital or not absence.doing else Severity.WARNING
             self._alarms.begin(AlarmKind.ABSENT, absence.name, line, absence.since_s, absence.remedy, severity=severity)
         names = frozenset(absence.name for absence in absent)
         for name in self._absent - names:
             self._alarms.end(AlarmKind.ABSENT, name, at_s)
         self._absent = names
+
+
+def _trouble(absence: Absence) -> str:
+    if absence.is_repeated:
+        return "fails again and again"
+    return "does not work" if absence.is_running else "is absent"

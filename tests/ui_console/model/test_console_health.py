@@ -103,3 +103,12 @@ def test_a_component_that_runs_and_does_not_work_is_not_called_absent() -> None:
     health = shown.view(6.0).health
     assert health is not None
     assert health.lines == ["radio has not worked for 2.0 s: its antenna is off; the RC manager tries it again"]
+
+
+def test_a_component_that_works_at_times_is_not_said_to_have_worked_never() -> None:
+    radio = Absence("radio", 4.0, "its antenna is off", "it is tried again", is_running=True, is_repeated=True)
+    shown = model(heard(5.0, HealthWord.DEGRADED, radio))
+    assert absent(shown, 6.0)["radio"].line == "radio fails again and again: its antenna is off; it is tried again"
+    health = shown.view(6.0).health
+    assert health is not None
+    assert health.lines == ["radio has failed again and again for 2.0 s: its antenna is off; it is tried again"]

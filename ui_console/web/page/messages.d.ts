@@ -8,6 +8,7 @@ export interface Absence {
   remedy: string;
   vital: boolean;
   is_running: boolean;
+  is_repeated: boolean;
 }
 
 export type AlarmKind =
