@@ -172,6 +172,10 @@ class Processes(Message, frozen=True):
     processes: Annotated[list[ProcessState], MANY]
 
 
+class AskLoad(Message, frozen=True):
+    """Asks a creator for the load of its host; answer: ``HostLoad``."""
+
+
 class HostLoad(Message, frozen=True):
     """Load of a host. Each creator publishes it once a second and after every change of its processes.
 
@@ -250,7 +254,7 @@ class NotThePlacer(Refusal):
     remedy = "Ask the placer to start or stop the component."
 
 
-CreatorQuestion = Spawn | ReviseSpawn | EndProcess | ListProcesses
+CreatorQuestion = Spawn | ReviseSpawn | EndProcess | ListProcesses | AskLoad
 
 
 def creator_name(host: str) -> str:

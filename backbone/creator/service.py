@@ -23,6 +23,7 @@ from backbone.component.recurring import CALM_S, Recurring
 from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import (
     AlreadyHere,
+    AskLoad,
     CreatorQuestion,
     EndProcess,
     FixedTypes,
@@ -122,7 +123,7 @@ class Creator(Component[CreatorParameters]):
             await self.clock.sleep_s(LOAD_EACH_S * self.clock.rate)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``ListProcesses``, and the placer's ``Spawn``, ``ReviseSpawn`` and ``EndProcess``."""
+        """Answer ``ListProcesses`` and ``AskLoad``, and the placer's ``Spawn``, ``ReviseSpawn`` and ``EndProcess``."""
         question: Message = asked.body
         match question:
             case Spawn():
@@ -141,6 +142,8 @@ class Creator(Component[CreatorParameters]):
                 return ended
             case ListProcesses():
                 return Processes(self.launch.host, self.parameters.tags, self._keeper.processes())
+            case AskLoad():
+                return self._host_load()
         return await super().answer(asked)
 
     async def drain(self) -> None:
@@ -244,9 +247,11 @@ class Creator(Component[CreatorParameters]):
         return psutil.cpu_percent() / 100.0, psutil.virtual_memory().percent / 100.0, psutil.cpu_count() or 1
 
     def _publish_load(self) -> None:
+        self.bus.publish(self.address, Conversation.TELEMETRY, self._host_load())
+
+    def _host_load(self) -> HostLoad:
         cpu, memory, cores = self._load
-        load = HostLoad(self.launch.host, self.parameters.tags, cpu, memory, cores, self._count())
-        self.bus.publish(self.address, Conversation.TELEMETRY, load)
+        return HostLoad(self.launch.host, self.parameters.tags, cpu, memory, cores, self._count())
 
     def _count(self) -> int:
         return len(self._keeper.processes())

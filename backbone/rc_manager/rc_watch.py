@@ -23,9 +23,9 @@ from backbone.placer.messages import Start, Started
 from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch, Hold, in_pool
 from backbone.rc_manager.credibility import contradiction
 from backbone.rc_manager.failures import Failures
-from backbone.rc_manager.host_links import HostLinks
 from backbone.rc_manager.messages import AskRc, RcState
 from backbone.rc_manager.recovery import Found, Recovery
+from backbone.rc_manager.silent_hosts import SilentHosts
 from backbone.scheduling.events import CapacityChanged, Event, RcCameBack, RcWentDown
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.shares import Shares
@@ -86,7 +86,7 @@ class RcWatch:
             recovery: Finds the present components.
         """
         self._service, self._failures = service, failures
-        self._links = HostLinks(service.bus, service.clock, service.launch.host)
+        self._hosts = SilentHosts(service.bus, service.clock, service.launch.host)
         self._context_switch = context_switch
         self._recovery = recovery
         self.resources: dict[str, Resource] = {}
@@ -109,8 +109,8 @@ class RcWatch:
         return self._failures.absences(needed, "the RC manager tries it again", self._remedy)
 
     def _remedy(self, rc: str) -> str:
-        link = self._links.remedy(rc) if self._failures.is_silent(rc) else ""
-        return link or REMEDY.format(name=rc)
+        host = self._hosts.remedy(rc) if self._failures.is_silent(rc) else ""
+        return host or REMEDY.format(name=rc)
 
     def missing(self) -> list[str]:
         """Return the RCs that do not run, sorted."""
@@ -179,7 +179,7 @@ class RcWatch:
             self._failing.add(rc)
             self._service.start_task(self._meet_later(rc, self._pauses_s.get(rc, MEET_AGAIN_S)), f"meet {rc}")
             if self._failures.is_silent(rc):
-                self._service.start_task(self._measure_link(rc), f"measure the link to {rc}")
+                self._service.start_task(self._measure_host(rc), f"measure the host of {rc}")
 
     def connected(self, rcs: Iterable[str]) -> None:
         """Note that these RCs were connected."""
@@ -267,8 +267,8 @@ class RcWatch:
             if rc not in self.up:
                 self._failures.end(rc)
 
-    async def _measure_link(self, rc: str) -> None:
-        await self._links.measure(rc)
+    async def _measure_host(self, rc: str) -> None:
+        await self._hosts.measure(rc)
         self._service.changed()
 
     async def _ask(self, rc: str, given: int | None = None) -> RcState | None:

@@ -21,6 +21,7 @@ from backbone.component.messages import Parameters as ParametersAnswer
 from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import (
     AlreadyHere,
+    AskLoad,
     EndedBy,
     EndProcess,
     FixedTypes,
@@ -243,6 +244,7 @@ def test_the_load_is_published_each_second_and_when_processes_change(on_host: Ca
         assert 0.0 <= load.cpu <= 1.0
         assert 0.0 < load.memory <= 1.0
         assert load.cores >= 1
+        assert await host.stranger.ask(CREATOR, AskLoad(), HostLoad, within_s=1.0) == load
 
     on_host(body)
 

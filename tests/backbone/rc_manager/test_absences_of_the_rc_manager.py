@@ -9,7 +9,8 @@ from rc_manager_at_work import HARDWARE, request
 
 from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import run_virtual
-from backbone.component.messages import Absence, AskState, AskTime, ComponentState, MissionTime
+from backbone.component.messages import Absence, AskState, ComponentState
+from backbone.creator.messages import AskLoad, HostLoad
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.placer.messages import Start, Started
@@ -70,26 +71,29 @@ def test_an_rc_that_is_connected_in_vain_is_named_until_it_is_connected(pool: An
 
 
 @pytest.mark.parametrize(
-    ("own_host", "round_trip_s", "remedy"),
+    ("own_host", "round_trip_s", "cpu", "remedy"),
     [
-        ("here", 0.6, "examine its hardware"),
-        ("base", 0.02, "examine its hardware"),
-        ("base", 0.6, "check the link to here: a round trip takes 0.60 s"),
-        ("base", 60.0, "check the link to here: its creator does not answer either"),
+        ("here", 0.6, 0.5, "examine its hardware"),
+        ("here", 60.0, 0.5, "examine its hardware"),
+        ("here", 0.6, 0.97, "run less on here: 97% of its processor time is used"),
+        ("base", 0.02, 0.5, "examine its hardware"),
+        ("base", 0.02, 0.97, "run less on here: 97% of its processor time is used"),
+        ("base", 0.6, 0.5, "check the link to here: a round trip takes 0.60 s"),
+        ("base", 60.0, 0.5, "check the link to here: its creator does not answer either"),
     ],
 )
-def test_the_remedy_for_an_rc_that_does_not_answer_names_a_slow_link(
-    pool: Any, own_host: str, round_trip_s: float, remedy: str
+def test_the_remedy_for_an_rc_that_does_not_answer_names_a_slow_link_or_a_full_processor(
+    pool: Any, own_host: str, round_trip_s: float, cpu: float, remedy: str
 ) -> None:
     async def main() -> None:
         async with pool() as here, here.beside(here.manager(own_host)):
             asker, creator = await here.arc("asker"), here.network.join("backbone/creator-here", here.clock)
 
-            async def answer(_asked: Envelope[AskTime]) -> Message:
+            async def answer(_asked: Envelope[AskLoad]) -> Message:
                 await here.clock.sleep_s(round_trip_s)
-                return MissionTime(0.0, 1.0, 0.0)
+                return HostLoad("here", [], cpu, 0.5, 2, 3)
 
-            creator.serve("backbone/creator-here", AskTime, answer)
+            creator.serve("backbone/creator-here", AskLoad, answer)
             here.rcs["left"].hangs = True
             here.rcs["left"].changed()
             await asker.ask_for(request("asker", "left"))

@@ -1,7 +1,7 @@
-"""Links to the hosts of RCs that do not answer, because a slow link looks like a fault of the RC.
+"""Hosts of RCs that do not answer, because a slow link or a full processor looks like a fault of the RC.
 
-The watch over the RCs measures the round trip to the creator of such an RC's host. If it is long, or the creator does
-not answer either, the remedy of the RC names the link.
+The watch over the RCs asks the creator of such an RC's host for the load, and measures the round trip. If the creator
+answers late or not at all, or the processor is full, the remedy of the RC names this cause.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import AskTime, MissionTime
-from backbone.creator.messages import creator_name
+from backbone.creator.messages import AskLoad, HostLoad, creator_name
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import Resolve, Resolved
 from backbone.naming import Subsystem, address
@@ -20,16 +19,18 @@ from backbone.naming import Subsystem, address
 LONG_S = 0.1  # chosen: from this round trip on, the RCs of a host need a longer time to disconnect
 MEASURED_WITHIN_S = 2.0  # chosen: a link without any message for this time counts as cut
 GRANTED_BELOW_S = 0.3  # chosen: a grant needs three messages across the link, in the second that an ARC has to open
+FULL = 0.9  # chosen: over a second, so that a component mostly waits until others let it run
 
 
 @dataclass(frozen=True, slots=True)
 class _Measured:
     host: str
     round_trip_s: float | None
+    cpu: float = 0.0
 
 
-class HostLinks:
-    """Round trips to the hosts of RCs, as last measured.
+class SilentHosts:
+    """Round trips to the hosts of silent RCs and the load of these hosts, as last measured.
 
     Args:
         own_host: Host of the RC manager, to which no link leads.
@@ -40,28 +41,36 @@ class HostLinks:
         self._measured: dict[str, _Measured] = {}
 
     async def measure(self, rc: str) -> None:
-        """Measure the round trip to the creator of the RC's host."""
+        """Measure the round trip to the creator of the RC's host, and ask it for the load."""
         self._measured.pop(rc, None)
         try:
             found = await self._bus.ask(NAMESERVER, Resolve(rc), Resolved, within_s=MEASURED_WITHIN_S)
         except (LinkError, Refusal):  # it is gone: its absence has other causes
             return
-        host = found.component.host
-        if host == self._own_host:
-            return
-        asked_s, creator = self._clock.now_s(), address(Subsystem.BACKBONE, creator_name(host))
-        round_trip_s = None
+        host, asked_s = found.component.host, self._clock.now_s()
+        measured = _Measured(host, None)
         with suppress(LinkError):
-            with suppress(Refusal):  # a refusal is an answer, too
-                await self._bus.ask(creator, AskTime(), MissionTime, within_s=MEASURED_WITHIN_S)
-            round_trip_s = (self._clock.now_s() - asked_s) / self._clock.rate
-        self._measured[rc] = _Measured(host, round_trip_s)
+            cpu = await self._cpu(host)
+            measured = _Measured(host, (self._clock.now_s() - asked_s) / self._clock.rate, cpu)
+        self._measured[rc] = measured
+
+    async def _cpu(self, host: str) -> float:
+        creator = address(Subsystem.BACKBONE, creator_name(host))
+        try:
+            return (await self._bus.ask(creator, AskLoad(), HostLoad, within_s=MEASURED_WITHIN_S)).cpu
+        except Refusal:  # an answer, too, of a creator that ends
+            return 0.0
 
     def remedy(self, rc: str) -> str:
-        """Return the remedy for an RC behind a slow or silent link; empty: its link is not the cause."""
+        """Return the remedy for an RC on a full host, or behind a slow or silent link; empty: neither is the cause."""
         measured = self._measured.get(rc)
         if measured is None:
             return ""
+        if measured.cpu >= FULL:
+            return f"run less on {measured.host}: {measured.cpu:.0%} of its processor time is used, so answers are late"
+        return self._remedy_of_link(measured) if measured.host != self._own_host else ""
+
+    def _remedy_of_link(self, measured: _Measured) -> str:
         if measured.round_trip_s is None:
             return f"check the link to {measured.host}: its creator does not answer either"
         if measured.round_trip_s < LONG_S:
