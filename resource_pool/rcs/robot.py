@@ -90,6 +90,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._timeouts = 0
         self._stop_file = StopFile(launch.run_directory, self.name)
         self._latch = StopLatch(self.name, self._stop_file.read())
+        self._repeating: asyncio.Task[None] | None = None
         reader = cast("ReplyReader", self._protocol)
         self._reports = RobotReports(
             self.name,
@@ -114,8 +115,8 @@ class RobotRc(ResourceController[P], Generic[P]):
     async def serve(self) -> None:
         """Stop the wheels when no command comes, and end the hold when its lease expires."""
         if self._latch.state.is_stopped:
-            self._tell_stop(self._latch.state, "is still stopped")
-            self._confirm_at_rest()
+            self._publish_stop(f"is still stopped (by {self._latch.state.by})")
+            self._follow_stop()
         self.start_task(self._halt_when_silent(), "dead man")
         self.start_task(self._reports.publish_when_due(), "readings")
         await super().serve()
@@ -148,10 +149,11 @@ class RobotRc(ResourceController[P], Generic[P]):
             case LiftStop(number=number, user=user):
                 if self._latch.lift(number, user or asked.source, self.clock.now_s()):
                     self._keep_stop()
+                    self._follow_stop()
                     lifted = self._latch.state
                     await self._end_stop_packet()  # first, because commands follow the news
                     if self._latch.state == lifted:
-                        self._tell_stop(lifted, "may move again")
+                        self._publish_stop(f"may move again (by {lifted.by})")
                 return self._latch.state
             case _:
                 return await super().answer(asked)
@@ -239,8 +241,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     def statistics(self) -> dict[str, float]:
         """Also count halts for lack of commands, emergency stops and replies."""
-        stops = float(self._latch.state.number)
-        own = {"command_timeouts": self._timeouts, "emergency_stops": stops}
+        own = {"command_timeouts": self._timeouts, "emergency_stops": float(self._latch.state.number)}
         return {**super().statistics(), **own, **self._reports.statistics()}
 
     async def _stop_now(self, by: str, reason: str, console: str) -> StopState:
@@ -251,39 +252,43 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._keep_stop()
         self._halt_at_s = None
         self.cease()
+        await self._try_stop()
+        self._publish_stop(f"was stopped{f': {reason}' if reason else ''} (by {by})" if is_new else "")
+        self._follow_stop()
+        return self._latch.state
+
+    async def _try_stop(self) -> None:
+        """Confirm the stop if the radio accepts its packet, or if no packet of a former holder moves the robot soon."""
         holder = self._holder
-        if holder is not None:
-            try:
-                await self._load(holder, self.stop_packet())
-            except (Refusal, LinkError) as error:  # the robot halts by itself when its last drive expires
-                self.story.note(holder.arc, f"the stop was not sent: {error}")
-                self._latch.confirm(False)
-            else:
-                self._latch.confirm(True)
-                self._tell_halted(holder)
-        else:
+        if holder is None:
             # A former holder's last packet was a safe one, or the radio was late, or sends no more.
             until_s = min(self._at_rest_s, self.clock.now_s() + RADIO_REPLY_S * self.clock.rate)
             await self.clock.sleep_until_s(until_s)
             self._latch.confirm(self._at_rest_s <= until_s)  # not the time of the clock: a wait may end a little early
-            self._confirm_at_rest()
-        self._publish_stop()
-        if is_new:
-            self.publish_event(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
-        return self._latch.state
+            return
+        try:
+            await self._load(holder, self.stop_packet())
+        except (Refusal, LinkError) as error:  # the robot halts by itself when its last drive expires
+            self.story.note(holder.arc, f"the stop was not sent: {error}")
+            self._latch.confirm(False)
+        else:
+            self._latch.confirm(True)
+            self._tell_halted(holder)
 
-    def _confirm_at_rest(self) -> None:
-        """Confirm a stop without a holder as soon as no former packet can move the robot."""
-        stop = self._latch.state
+    def _follow_stop(self) -> None:
+        """Repeat the stop in force until it is confirmed; repeat no earlier stop."""
+        if self._repeating is not None:
+            self._repeating.cancel()
+        if not self._latch.state.is_confirmed:
+            self._repeating = self.start_task(self._repeat_stop(), "repeat stop")
 
-        async def confirm() -> None:
-            await self.clock.sleep_until_s(self._at_rest_s)
-            if self._latch.state == stop:
-                self._latch.confirm(True)
-                self._publish_stop()
-
-        if not stop.is_confirmed:
-            self.start_task(confirm(), "at rest")
+    async def _repeat_stop(self) -> None:
+        """Publish that the stop is confirmed as soon as it is; a radio gets it at most every ``RADIO_REPLY_S``."""
+        while not self._latch.state.is_confirmed:
+            if self._holder is not None:
+                await self.clock.sleep_s(RADIO_REPLY_S * self.clock.rate)
+            await self._try_stop()
+        self._publish_stop("has confirmed its stop")
 
     async def _end_stop_packet(self) -> None:
         """Repeat a halt from now on: repeated stop packets would stop a part that moves beside the wheels again."""
@@ -299,19 +304,17 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Return the stop in force, for the published state."""
         return self._latch.standing()
 
-    def _tell_stop(self, state: StopState, what: str) -> None:
-        self._publish_stop()
-        self.publish_event(self.name, f"{what} (by {state.by})")
-
     def _tell_halted(self, hold: Hold) -> None:
         """Publish that the robot was halted without a command."""
         halted = Applied(self.name, hold.epoch, self.clock.now_s(), Halt.word(), number=self.applied)
         self.bus.publish(self.address, Conversation.MOTIONS, halted)
 
-    def _publish_stop(self) -> None:
-        """Publish the stop before its operator has the answer: this host may die the next moment."""
+    def _publish_stop(self, news: str) -> None:
+        """Publish the stop, and news if any, before its operator has the answer: this host may die the next moment."""
         self.publish_news()  # the nameserver keeps the stop for an RC on another host
         self.bus.publish(self.address, Conversation.EVENTS, self._latch.state)
+        if news:
+            self.publish_event(self.name, news)
 
     def _keep_stop(self) -> None:
         """Save the stop for the next process of this RC; a write error must not prevent the stop."""
