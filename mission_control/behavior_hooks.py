@@ -20,11 +20,14 @@ class BehaviorHooks:
 
     needs_arc: ClassVar[str] = ""
     """Kind of ARC like which the behavior needs one. A class that overrides ``see`` and sets no kind needs pictures;
-    one that overrides ``act``, an ARC of any kind."""
+    one that overrides ``act``, an ARC of any kind. Classes derived from one that sets ``""`` need none either."""
+    _needs_none: ClassVar[bool] = False
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        if "needs_arc" not in vars(cls) and cls.needs_arc in ("", ANY_ARC):
+        if "needs_arc" in vars(cls):
+            cls._needs_none = cls.needs_arc == ""
+        elif not cls._needs_none and cls.needs_arc in ("", ANY_ARC):
             cls.needs_arc = "capture" if "see" in vars(cls) else ANY_ARC if "act" in vars(cls) else cls.needs_arc
 
     async def start(self) -> None:

@@ -61,6 +61,28 @@ class Idler(Bellringer):
     needs_arc = ""
 
 
+class BusyIdler(Idler):
+    async def act(self) -> None:
+        pass
+
+
+class ActsSometimes(LooksSometimes):
+    async def act(self) -> None:
+        pass
+
+
+class AskingIdler(BusyIdler):
+    needs_arc = "any"
+
+    async def act(self) -> None:
+        pass
+
+
+class SeeingIdler(AskingIdler):
+    def see(self, frame: Frame) -> None:
+        pass
+
+
 def test_a_class_of_ones_own_that_acts_needs_an_arc_unless_it_says_otherwise(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -83,3 +105,14 @@ def test_a_class_of_ones_own_that_acts_needs_an_arc_unless_it_says_otherwise(
 def test_a_class_of_ones_own_that_sees_needs_pictures_unless_it_says_otherwise() -> None:
     assert facts_of(f"{__name__}:Watcher").needs_arc == "capture"
     assert facts_of(f"{__name__}:LooksSometimes").needs_arc == ""
+
+
+@pytest.mark.parametrize(
+    ("behavior", "needed"),
+    [(BusyIdler, ""), (ActsSometimes, ""), (AskingIdler, "any"), (SeeingIdler, "capture")],
+    ids=lambda given: getattr(given, "__name__", given),
+)
+def test_a_class_that_needs_no_arc_passes_that_on_until_a_derived_class_sets_another_kind(
+    behavior: type[Behavior[BehaviorParameters]], needed: str
+) -> None:
+    assert behavior.needs_arc == needed
