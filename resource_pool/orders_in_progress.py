@@ -6,27 +6,11 @@ import asyncio
 from collections.abc import Awaitable
 from typing import TypeVar
 
-from backbone.ranges import MOST_MEASURE
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.holds import Hold
 
 T = TypeVar("T")
 CUT_WITHIN_S = 0.1  # chosen: of the time for the safe state, so that it is reached even if a command goes on
-
-
-def applied_values(given: object, what: str) -> dict[str, float]:
-    """Return the applied values that ``obey`` returned, without numbers that are not finite, as for reports.
-
-    Raises:
-        TypeError: They are not numbers by name.
-    """
-    try:
-        numbers = {name: float(value) for name, value in dict(given).items()}  # type: ignore[call-overload]
-    except (TypeError, ValueError):
-        raise TypeError(
-            f"obey returned {given!r:.80} for {what}; return the applied values, each name with a number"
-        ) from None
-    return {name: number for name, number in numbers.items() if abs(number) <= MOST_MEASURE}  # not nan, see ranges
 
 
 class OrdersInProgress:

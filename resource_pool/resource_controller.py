@@ -56,8 +56,8 @@ from resource_pool.hold_ends import FAULTS, SAFE_WITHIN_S, HoldEnds, detail_of
 from resource_pool.holds import Hold, HoldTable
 from resource_pool.messages import Applied, ImpossibleUse, NotFromYou
 from resource_pool.obeyed_commands import command_forms
-from resource_pool.orders_in_progress import applied_values
 from resource_pool.rc_parameters import RcParameters, sort_out_options
+from resource_pool.returned_numbers import applied_values
 
 __all__ = ["RcParameters", "ResourceController"]
 

@@ -190,18 +190,6 @@ class RobotProtocol(Protocol):
         """Return the packet after which the robot neither moves nor transmits."""
 
 
-def of_bytes(protocol: type, method: str, returned: object) -> object:
-    """Return what this method of a robot's protocol returned.
-
-    Raises:
-        HardwareFault: It is not of bytes, but the method returns a packet.
-    """
-    declared = getattr(getattr(protocol, method, None), "__annotations__", {}).get("return")
-    if declared in (bytes, "bytes") and not isinstance(returned, bytes | bytearray | memoryview):
-        raise HardwareFault(f"{method} of the robot's protocol returns {type(returned).__name__}, no bytes")
-    return returned
-
-
 class MalformedReply(Refusal):
     """The bytes are not a reply of this kind of robot."""
 

@@ -50,6 +50,7 @@ from resource_pool.messages import (
 )
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
 from resource_pool.resource_controller import RcParameters, ResourceController
+from resource_pool.returned_numbers import number_between
 from resource_pool.slow_packets import EVERY_S, SlowPackets
 from resource_pool.stop_messages import GivenBeforeStop
 
@@ -335,13 +336,8 @@ class CommandRadio(ResourceController[RcParameters]):
         """Refuse a time on the air that is no number or would block the air for no real reason."""
         if method != "transmit" or returned is None:
             return returned
-        try:
-            took_s = float(returned)  # type: ignore[arg-type]  # a driver may return anything
-        except (TypeError, ValueError):
-            took_s = math.nan
-        if not 0 <= took_s <= LONGEST_PACKET_S:
-            raise HardwareFault(f"the driver of {self.name} reports {returned!r} s on the air for one packet")
-        return took_s
+        fault = f"the driver of {self.name} reports {{}} s on the air for one packet"
+        return number_between(0.0, LONGEST_PACKET_S, returned, fault)
 
     def _measured(self, sending: Sending, took_s: float) -> None:
         """Publish the longest time of these packets if it is new and longer than declared."""

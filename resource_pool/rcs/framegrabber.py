@@ -33,12 +33,14 @@ from resource_pool.drivers.interface import FramegrabberDriver, HardwareFault, P
 from resource_pool.holds import Hold
 from resource_pool.messages import Accepted, Frame, NothingHeard
 from resource_pool.resource_controller import RcParameters, ResourceController
+from resource_pool.returned_numbers import number_between
 
 log = logging.getLogger(__name__)
 
 SILENT_S = 0.5  # chosen: a packet gets its turn on the radio within 0.3 s, and its robot appears two pictures later
 WRONG_S = 1.0  # chosen: more than clocks of hosts differ, and than a driver delivers late; mission time
 DARK_S = 2.0  # chosen: four times SILENT_S, after which a transmitter is switched on again; machine seconds
+MOST_HZ = 1e3  # chosen: ten times as many pictures as fast cameras deliver
 DARK_PICTURES = 3  # chosen: so many pictures may be missing at a low rate
 LEAST_PX = 2  # chosen: vision halves pictures; a smaller one comes of a driver that got none
 LONGEST_WORD = LONGEST_MENTION - len("frames_")  # a kind is part of a statistic's name
@@ -79,13 +81,13 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._driver: FramegrabberDriver = self.make_driver()
+        self._driver: FramegrabberDriver = self.make_driver(judge=self._credible)
         self._tuned: tuple[str, Callable[[Picture], None]] | None = None
         self._tuned_anew = asyncio.Event()
         self._delivered = self._garbled = self._silent = self._foreign = 0
         self._kinds: Counter[str] = Counter()
         self._silent_since_s = math.inf
-        self._newest_s, self._mistimed, self._has_told = -math.inf, 0, False
+        self._newest_s, self._mistimed, self._has_told, self._has_told_rate = -math.inf, 0, False, False
         self._tuned_s = self._came_s = -math.inf
         self._shown_s, self._dark_since_s, self._why_dark = -math.inf, math.inf, ""
         self._watched_by = ""
@@ -175,11 +177,10 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         allows now; the driver lowers it on a busy host. If the hardware knows the faults of its pictures, count the
         pictures of each kind too, delivered or dropped.
         """
-        driver, asked_hz = self._driver, self.parameters.frame_rate_hz
         return {
             **super().statistics(),
-            "pictures_asked_hz": asked_hz,
-            "pictures_allowed_hz": driver.allowed_hz() if hasattr(driver, "allowed_hz") else asked_hz,
+            "pictures_asked_hz": self.parameters.frame_rate_hz,
+            "pictures_allowed_hz": self._allowed_hz(),
             "frames_delivered": self._delivered,
             "frames_garbled": self._garbled,
             "frames_silent": self._silent,
@@ -265,9 +266,25 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
 
     def _dark_after_s(self) -> float:
         """Return the mission seconds without a picture after which an ARC counts as blind."""
-        driver = self._driver
-        hz = driver.allowed_hz() if hasattr(driver, "allowed_hz") else self.parameters.frame_rate_hz
+        hz = self._allowed_hz()
         return max(DARK_S * self.clock.rate, DARK_PICTURES / hz if hz > 0 else 0.0)
+
+    def _allowed_hz(self) -> float:
+        """Return the driver's limit of the picture rate, or without a credible one the rate that is asked for."""
+        driver, asked_hz = self._driver, self.parameters.frame_rate_hz
+        try:
+            return driver.allowed_hz() if hasattr(driver, "allowed_hz") else asked_hz
+        except HardwareFault as fault:
+            if not self._has_told_rate:
+                self._has_told_rate = True
+                self.publish_event(self.name, fault.detail, LogLevel.WARNING)
+            return asked_hz
+
+    def _credible(self, method: str, returned: object) -> object:
+        """Refuse a limit of the picture rate that is no number, or far from every rate of a camera."""
+        if method != "allowed_hz":
+            return returned
+        return number_between(0.0, MOST_HZ, returned, f"the driver of {self.name} allows {{}} pictures a second")
 
     def _is_dark(self, arc: str) -> None:
         self._dark_since_s = self._shown_s

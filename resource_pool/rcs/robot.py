@@ -24,11 +24,12 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
 from resource_pool.commands import Command, Halt, SwitchTransmitter
-from resource_pool.drivers.interface import ReplyReader, RobotProtocol, of_bytes
+from resource_pool.drivers.interface import ReplyReader, RobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, AskReadings, LoadPacket, NotFromYou, PacketLoaded
 from resource_pool.rc_parameters import RobotParameters
 from resource_pool.resource_controller import ResourceController
+from resource_pool.returned_numbers import applied_values, as_declared
 from resource_pool.robot_reports import RobotReports
 from resource_pool.stop_file import StopFile
 from resource_pool.stop_latch import StopLatch
@@ -78,7 +79,7 @@ class RobotRc(ResourceController[P], Generic[P]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._protocol: RobotProtocol = self.make_driver(
-            self.parameters.protocol, judge=functools.partial(of_bytes, self.driver_protocol)
+            self.parameters.protocol, judge=functools.partial(as_declared, self.driver_protocol)
         )
         self._radio = (self.parameters.links.get("command_radio") or [""])[0]
         self._halt_at_s: float | None = None
@@ -162,8 +163,8 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Also publish the applied values, with the resulting motion."""
         done = await super().command(asked)
         if isinstance(done, Applied):
-            values = {**done.values, **self.motion_of(done.values)}
-            told = msgspec.structs.replace(done, values=values, number=self.applied)
+            motion = applied_values(self.motion_of(done.values), done.command, "motion_of")
+            told = msgspec.structs.replace(done, values=done.values | motion, number=self.applied)
             self.bus.publish(self.address, Conversation.MOTIONS, told)
         return done
 
@@ -292,8 +293,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     async def _end_stop_packet(self) -> None:
         """Repeat a halt from now on: repeated stop packets would stop a part that moves beside the wheels again."""
-        holder = self._holder
-        if holder is None:
+        if (holder := self._holder) is None:
             return
         try:
             await self._load(holder, self._protocol.halt())

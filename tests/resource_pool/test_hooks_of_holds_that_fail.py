@@ -188,7 +188,11 @@ class SilentLamp(Lamp):
         return self.given
 
 
-@pytest.mark.parametrize("given", [None, {"brightness": "bright"}, 1.0], ids=repr)
+@pytest.mark.parametrize(
+    "given",
+    [None, {"brightness": "bright"}, {"brightness": "1"}, 1.0, {1: 1.0}, {"n" * 256: 1.0}, {"a": [1]}],
+    ids=["none", "text", "number as text", "no mapping", "no name", "long name", "list"],
+)
 def test_what_obey_returned_in_place_of_applied_values_is_told(local_mission: Any, given: object) -> None:
     async def main() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
@@ -198,7 +202,9 @@ def test_what_obey_returned_in_place_of_applied_values_is_told(local_mission: An
             with pytest.raises(NoResponder):
                 await pool.voice("one").ask("resource_pool/lights", Shine(1.0).under("one", 1), Applied, within_s=1.0)
             bug = await pool.outcome("lights")
-            assert str(bug) == f"obey returned {given!r} for shine; return the applied values, each name with a number"
+            assert (
+                str(bug) == f"obey returned {given!r:.80} for shine; return the applied values, each name with a number"
+            )
 
     run_virtual(main())
 
@@ -207,7 +213,7 @@ def test_of_applied_values_a_number_that_is_not_finite_is_left_out(local_mission
     async def main() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
             lamp = await pool.start(SilentLamp, "lights", {"driver": "resource_pool.rcs.skeleton:PaintedLamp"})
-            lamp.given = {"range_m": float("nan"), "echo_s": float("inf"), "brightness": 1.0}
+            lamp.given = {"range_m": float("nan"), "echo_s": float("inf"), "count": 10**400, "brightness": 1.0}
             await _connect(pool, "one")
             order = Shine(1.0).under("one", 1)
             applied = await pool.voice("one").ask("resource_pool/lights", order, Applied, within_s=1.0)
