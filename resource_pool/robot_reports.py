@@ -102,11 +102,10 @@ class RobotReports:
 
     def _take(self, reader: ReplyReader, payload: bytes) -> None:
         try:
-            report = reader.read(payload)
-            msgspec.convert(msgspec.to_builtins(report), type(report))  # a value is out of range
-        except (MalformedReply, msgspec.ValidationError) as error:
+            report = _checked(reader.read(payload))
+        except MalformedReply as error:
             self._malformed += 1
-            self._count_wrong(error.detail if isinstance(error, MalformedReply) else str(error))
+            self._count_wrong(error.detail)
             return
         self._read += 1
         self._count_right()
@@ -138,3 +137,18 @@ class RobotReports:
                 self._say(f"its battery is charged again: {share:.0%}", LogLevel.NOTICE)
             case Charge.AS_BEFORE:
                 pass
+
+
+def _checked(report: object) -> msgspec.Struct:
+    """Return what a protocol has read.
+
+    Raises:
+        MalformedReply: It is no struct, or one of its values is of another type than declared, or out of range.
+    """
+    if not isinstance(report, msgspec.Struct):
+        raise MalformedReply(f"read of the robot's protocol returns {report!r:.40}, no struct")
+    try:
+        msgspec.convert(msgspec.to_builtins(report), type(report))
+    except (msgspec.ValidationError, TypeError) as error:  # a TypeError: no message carries a value of this type
+        raise MalformedReply(str(error)) from error
+    return report

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import msgspec
+import numpy as np
 import pytest
 from pool_on_local_network import WiretappedRadio, a_pool
 from replying_pool import (
@@ -61,6 +62,15 @@ class SonarProtocol(SimulatedScoutProtocol):
 
 class SonarScout(Scout):
     reports = Sonars
+
+
+class CarelessProtocol(SimulatedScoutProtocol):
+    """Reads something that is no report of a Scout."""
+
+    report: ClassVar[Any] = None
+
+    def read(self, payload: bytes) -> Any:
+        return self.report
 
 
 class SilentProtocol:
@@ -211,5 +221,30 @@ def test_a_number_that_no_message_carries_is_left_out_of_the_readings(local_miss
             await pool.clock.sleep_s(2.0)
             assert [told.values for told in published] == [{"battery_share": 0.5}]
             assert (await asked(pool)).values == {"battery_share": 0.5}
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(
+    "report",
+    [None, {"battery_share": 0.5}, 0.5, ScoutReports(np.float32(0.5), 0.0, 0.0)],  # type: ignore[arg-type]
+    ids=["None", "a mapping", "a number", "a value that no message carries"],
+)
+def test_a_report_that_is_none_is_malformed_and_ends_no_rc(
+    local_mission: Any, monkeypatch: pytest.MonkeyPatch, report: object
+) -> None:
+    monkeypatch.setattr(CarelessProtocol, "report", report)
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"]) as pool:
+            await pool.rc("scout1", protocol=f"{HERE}:CarelessProtocol")
+            events = overhear(pool, SCOUT1, Conversation.LOG, StoryEvent)
+            for _reply in range(3):
+                pool.voice("radio").publish(RADIO, Conversation.REPLIES, Reply(1, b"any"))
+            await pool.clock.sleep_s(1.0)
+            assert counts(pool, "scout1")["replies_malformed"] == 3
+            [warning] = said(events)
+            assert warning[2].startswith("its replies cannot be decoded: ")
+            assert (await asked(pool)).values == {}
 
     run_virtual(main())
