@@ -216,6 +216,18 @@ class Cart(RobotRc[RobotParameters]):
 
 class Driven(Cart):
     async def obey(self, hold, order): return {}
+
+class NoTuple(Driven):
+    obeyed = Turn
+    async def obey(self, hold, order): return {}
+
+class Words(NoTuple):
+    obeyed = ("turn",)
+    async def obey(self, hold, order): return {}
+
+class Nothing(NoTuple):
+    obeyed = None
+    async def obey(self, hold, order): return {}
 """
 
 
@@ -225,6 +237,16 @@ def test_an_rc_that_carries_out_no_command_is_refused(own: Path, name: str, lack
     (own / "own_deaf.py").write_text(DEAF)
     failure = facts_of(f"own_deaf:{name}").failure
     assert failure == (f"commands has {lacking}, and no obey carries it out" if lacking else "")
+
+
+@pytest.mark.parametrize("name", ["NoTuple", "Words", "Nothing"])
+def test_an_rc_whose_obeyed_is_no_tuple_of_commands_is_refused_with_the_name_of_the_attribute(
+    own: Path, name: str
+) -> None:
+    (own / "own_deaf.py").write_text(DEAF)
+    failure = facts_of(f"own_deaf:{name}").failure
+    assert f"obeyed of {name} is " in failure
+    assert failure.endswith("; write a tuple of command classes")
 
 
 def test_a_class_whose_file_is_no_python_is_not_called_missing(own: Path) -> None:
