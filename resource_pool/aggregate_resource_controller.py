@@ -190,7 +190,7 @@ class AggregateResourceController(Component[ArcParameters]):
             case CloseGate() as order:
                 return await self._close(order, asked.stamp_s)
             case AskRequest():
-                current = self._placed.current(self.epochs, self._gate.granted_s)
+                current = self._placed.current(self.epochs, self._gate.granted_s, self._slice.extended_until_s)
                 self._manager_watch.asks()
                 return current
             case TakePath(path=path):
@@ -294,7 +294,7 @@ class AggregateResourceController(Component[ArcParameters]):
         """Open the gate and notify the owner, unless the gate was closed meanwhile."""
         if not self._gate.open(order.epochs, self.clock.now_s()):
             return
-        self._slice.end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
+        self._slice.begin(max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s))
         self.report(f"granted: {', '.join(self._placed.rcs.values())}")
         rcs, robot = self._placed.rcs, self._placed.rc_of(self.body)
         noted = self._notices.notify(Resumed(self.name, rcs, order.epochs, order.until_s, robot))

@@ -21,6 +21,7 @@ class ArcSlice:
 
     Attributes:
         end_s: Mission time at which it may end.
+        extended_until_s: Mission time until which the RC manager extended it; 0: not extended.
     """
 
     def __init__(
@@ -43,9 +44,13 @@ class ArcSlice:
             longest_s: The longest run time that the ARC asks for now, seconds.
             note: Subject, event → the story.
         """
-        self.end_s = 0.0
+        self.end_s = self.extended_until_s = 0.0
         self._bus, self._clock, self._gate, self._owner = bus, clock, gate, owner
         self._arc, self._longest_s, self._note = gate.arc, longest_s, note
+
+    def begin(self, until_s: float) -> None:
+        """Begin a slice that may end then."""
+        self.end_s, self.extended_until_s = until_s, 0.0
 
     @property
     def longest_end_s(self) -> float:
@@ -86,4 +91,4 @@ class ArcSlice:
         """Request the extension of the slice until this time, at most the maximum run time from the grant on."""
         until_s = min(until_s, self.longest_end_s)
         await self._bus.ask(RC_MANAGER, Extend(self._arc, until_s), Done, within_s=RC_REPLY_S)
-        self.end_s = max(self.end_s, until_s)
+        self.end_s = self.extended_until_s = max(self.end_s, until_s)

@@ -126,15 +126,16 @@ class PlacedRequest:
             self.request = msgspec.structs.replace(self.request, path=path)
         self._changed({"path": [(node.name, node.priority) for node in path]})
 
-    def current(self, epochs: Mapping[str, int], granted_s: float) -> CurrentRequest:
-        """Return the request and its holds, for the recovery of a restarted RC manager.
+    def current(self, epochs: Mapping[str, int], granted_s: float, extended_until_s: float) -> CurrentRequest:
+        """Return the request, its holds and its extended slice, for the recovery of a restarted RC manager.
 
         Raises:
             UnknownRequest: There is no request yet.
         """
         if self.request is None:
             raise UnknownRequest(f"{self._arc} has no request yet")
-        return CurrentRequest(self.request, list(self.rcs.values()), dict(epochs), granted_s, self.waits_since_s)
+        rcs = list(self.rcs.values())
+        return CurrentRequest(self.request, rcs, dict(epochs), granted_s, self.waits_since_s, extended_until_s)
 
     def slice_ended(self, granted_s: float) -> None:
         """Take the last place in line, unless the slice that was granted then ended early."""

@@ -159,6 +159,7 @@ class CurrentRequest(Message, frozen=True):
         epochs: RC → epoch of each hold; empty if the gate is closed.
         granted_s: Mission time of the grant; negative if the gate is closed.
         waits_since_s: Mission time of its place in line: of its request, or of the end of its last whole slice.
+        extended_until_s: Mission time until which its owner extended its present slice; 0: not extended.
     """
 
     request: SchedulingRequest
@@ -166,6 +167,7 @@ class CurrentRequest(Message, frozen=True):
     epochs: Annotated[dict[Mention, Epoch], FEW]
     granted_s: Instant
     waits_since_s: Instant = 0.0
+    extended_until_s: Instant = 0.0
 
 
 # To RCs.

@@ -282,8 +282,11 @@ class RcManager(Component[RcManagerParameters]):
         for state in found.rcs.values():
             self.happened(CapacityChanged(state.name, state.capacity))
         for _, event in adopted:
+            arc = event.request.arc
+            if (until_s := found.arcs[arc].extended_until_s) > self.clock.now_s():
+                self.happened(Extended(arc, until_s))
             if event.request.idle:  # it sent that while no RC manager answered
-                self.happened(Idled(event.request.arc))
+                self.happened(Idled(arc))
         for current in found.waiting():
             self.admit_again(current)
         for state in found.rcs.values():

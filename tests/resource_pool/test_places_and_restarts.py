@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from pool_on_local_network import Owner, a_pool
 
 from backbone.bus.clock import run_virtual
@@ -89,5 +90,37 @@ def test_an_order_of_a_dead_rc_manager_that_arrives_late_costs_no_lease(local_mi
             await pool.manager_voice.ask(arc.address, late, GateClosed, within_s=1)
             await pool.clock.sleep_s(0.1 + RENEW_EVERY_S)
             assert owner.heard() == ["Resumed", "Suspended", "Resumed"]
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("restarts", [1, 2])
+def test_a_slice_that_its_owner_extended_lasts_as_long_over_a_restart(local_mission: Any, restarts: int) -> None:
+    """The next RC manager ended it after the minimum run time, although the owner had been told otherwise."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ROBOT) as pool:
+            owner, other = await pool.owner("owner"), await pool.owner("other")
+            arc = await pool.arc(owner, "drive", "scout1", minimum_runtime_s=2.0, maximum_runtime_s=8.0)
+            await arc.wait_granted()
+            granted_s = pool.clock.now_s()
+            await pool.arc(other, "drive", "scout1", minimum_runtime_s=2.0)
+            await pool.clock.sleep_s(1.0)
+            await arc.want_longer(granted_s + 6.0)
+            for _ in range(restarts):
+                await pool.clock.sleep_s(0.3)
+                await pool.kill("rc_manager")
+                await pool.manager()
+            await pool.clock.sleep_s(granted_s + 5.9 - pool.clock.now_s())
+            assert owner.heard() == ["Resumed"]
+            await pool.clock.sleep_s(0.5)
+            assert owner.heard()[-1] == "Suspended"
+            assert other.heard() == ["Resumed"]
+            await pool.clock.sleep_s(2.5)
+            assert owner.heard()[-1] == "Resumed", "its next slice is not extended"
+            await pool.kill("rc_manager")
+            await pool.manager()
+            await pool.clock.sleep_s(2.5)
+            assert owner.heard()[-1] == "Suspended"
 
     run_virtual(main())
