@@ -27,6 +27,7 @@ from backbone.wire import Message
 log = logging.getLogger(__name__)
 
 SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; without an answer by then, the question was lost
+LARGEST_CAPACITY = 1.0  # a share of its time
 RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
 
 
@@ -96,8 +97,8 @@ class Found:
 def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
     """Return the event that introduces an RC.
 
-    Its capacity is the larger of the declared and the reported one, because its holders may have been connected before
-    it was lowered. The caller reports the present capacity after these.
+    With holders its capacity is the largest one, because they may have been connected before it was lowered. The caller
+    reports the present capacity after these.
 
     Args:
         resource: Its declaration in the mission file.
@@ -107,7 +108,7 @@ def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
         rc=resource.name,
         kind=resource.type,
         sharable=resource.sharable,
-        capacity=resource.capacity if state is None else max(resource.capacity, state.capacity),
+        capacity=LARGEST_CAPACITY if state is not None and state.holders else resource.capacity,
         connect_s=resource.connect_s,
         disconnect_s=resource.disconnect_s,
         up=state is not None,

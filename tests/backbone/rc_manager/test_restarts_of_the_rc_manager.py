@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+import rc_manager_at_work
 from msgspec.structs import replace
 from rc_manager_at_work import HARDWARE, request
 from trace_checker import check
@@ -23,6 +25,38 @@ def test_an_adopted_arc_that_no_longer_fits_is_revoked_at_once(pool: Any) -> Non
                 await one.ask_for(request("one", "left", "radio"))
                 await two.ask_for(request("two", "right", "radio"))
                 await here.clock.sleep_s(1.0)
+            here.rcs["radio"].tells = lambda state: replace(state, capacity=0.05)
+            async with here.beside(here.manager()):
+                await here.clock.sleep_s(0.1)
+                assert (one.is_open, two.is_open) == (True, False)
+                assert {*here.rcs["radio"].holders} == {"one"}
+                assert not here.rcs["right"].holders
+                await here.clock.sleep_s(6.0)
+                assert two.is_open, "it gets its turn"
+            return here.trace
+
+    lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
+    lines = lines[[line["ev"] for line in lines].index("meta", 1) :]
+    assert next(line["why"] for line in lines if line["ev"] == "revoke") == "capacity"
+    assert check(lines) == []
+
+
+def test_an_adopted_arc_is_revoked_at_once_if_the_capacity_was_raised_before_and_lowered_since(
+    pool: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was not adopted, and held its robot until its lease ended, while the RC manager counted it as waiting."""
+    narrow = [replace(one, capacity=0.05) if one.sharable else one for one in HARDWARE]
+    monkeypatch.setattr(rc_manager_at_work, "HARDWARE", narrow)
+
+    async def main() -> Path:
+        async with pool() as here:
+            one, two = await here.arc("one"), await here.arc("two")
+            async with here.beside(here.manager()):
+                await one.ask_for(request("one", "left", "radio"))
+                await two.ask_for(request("two", "right", "radio"))
+                await here.clock.sleep_s(1.0)
+                assert one.is_open
+                assert two.is_open
             here.rcs["radio"].tells = lambda state: replace(state, capacity=0.05)
             async with here.beside(here.manager()):
                 await here.clock.sleep_s(0.1)
