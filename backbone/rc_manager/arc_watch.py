@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 from collections import defaultdict
-from collections.abc import Coroutine, Iterable, Iterator
+from collections.abc import Coroutine, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.asking import ask_until_answered
 from backbone.component.messages import Absence
 from backbone.component.story import StoryBook
 from backbone.errors import LinkError, Refusal
@@ -36,13 +38,13 @@ from backbone.scheduling.events import Departed, Event
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest
 from backbone.scheduling.run_times import can_be_planned
-from backbone.scheduling.views import RequestAttributes
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
 OF_AN_ARC = (SchedulingRequest, Withdraw, SetIdle, ChangeRuntime, Extend)
 ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; without an answer it hangs or is gone
+PATH_WITHIN_S = 60.0  # chosen: longer than links are down; an ARC that is silent so long is forgotten before
 
 
 @dataclass(slots=True, eq=False)
@@ -72,7 +74,7 @@ class ArcService(Protocol):
     def admit_again(self, current: CurrentRequest) -> bool:
         """Admit a request with the RCs chosen for it earlier, unless an RC of them is gone."""
 
-    def start_task(self, work: Coroutine[object, None, None], name: str) -> object:
+    def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         """Run the coroutine until the component ends."""
 
 
@@ -91,6 +93,7 @@ class ArcWatch:
         self._beats = Beats(service.clock.rate)
         self._requesting: defaultdict[str, list[Choosing]] = defaultdict(list)
         self._meeting: set[str] = set()
+        self._telling: dict[str, asyncio.Task[None]] = {}
 
     def require_sender(self, asked: Envelope[Message]) -> None:
         """Check that a request of an ARC, or a change of it, comes from this ARC.
@@ -154,6 +157,8 @@ class ArcWatch:
         """Know the ARC and its requests no longer, and expect no beats; return whether a request was admitted."""
         for choosing in self._requesting.get(arc, ()):
             choosing.request = None
+        if (telling := self._telling.pop(arc, None)) is not None:
+            telling.cancel()
         self._failures.forget(arc)
         return self._beats.forget(arc)
 
@@ -195,13 +200,15 @@ class ArcWatch:
         except (Refusal, LinkError) as error:
             self._service.story.note(arc, f"got no place in the schedule: {error}")
 
-    def tell_paths(self, requests: Iterable[RequestAttributes]) -> None:
-        """Send ARCs their present paths, because a later RC manager must receive these from them."""
-        for one in requests:
-            self._service.start_task(self._tell_path(one.arc, one.path), f"path of {one.arc}")
+    def tell_path(self, arc: str, path: list[PathNode]) -> None:
+        """Send an ARC its present path until it answers, because a later RC manager must receive it from the ARC."""
+        if (earlier := self._telling.get(arc)) is not None:
+            earlier.cancel()
+        self._telling[arc] = self._service.start_task(self._tell_path(arc, path), f"path of {arc}")
 
     async def _tell_path(self, arc: str, path: list[PathNode]) -> None:
+        bus, clock, order = self._service.bus, self._service.clock, TakePath(path)
         try:
-            await self._service.bus.ask(in_pool(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
+            await ask_until_answered(bus, clock, in_pool(arc), order, Done, each_s=ARC_REPLY_S, within_s=PATH_WITHIN_S)
         except (Refusal, LinkError) as error:
             self._service.story.note(arc, f"did not accept its new path; the next RC manager would not get it: {error}")

@@ -218,7 +218,8 @@ class RcManager(Component[RcManagerParameters]):
     def _tell_paths(self, node: str) -> None:
         """Send the ARCs of the node and its descendants their present paths."""
         with contextlib.suppress(UnknownRequest):  # the node has no request yet
-            self._arcs.tell_paths(self.answers.attributes(node).requests)
+            for one in self.answers.attributes(node).requests:
+                self._arcs.tell_path(one.arc, one.path)
 
     def admit_again(self, current: CurrentRequest) -> bool:
         """Admit a request with the RCs chosen for it before, unless one is gone or they are no alternative."""
@@ -232,6 +233,11 @@ class RcManager(Component[RcManagerParameters]):
     def _admit(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
         self._arcs.remember(request.arc)
         self.happened(Requested(request, rcs))
+        arc = self.manager.master_schedule.state.arcs.get(request.arc)
+        if arc is not None and arc.request.path == request.path:  # else its last request is still being ended
+            path = self.manager.tree.nodes(arc.place_in_tree)
+            if path[-len(request.path) :] != request.path:  # an operator has changed it, and the ARC began anew since
+                self._arcs.tell_path(request.arc, path)
 
     def happened(self, event: Event, at_s: float | None = None) -> None:
         """Let the schedule manager decide on the event, at ``at_s`` or now, and begin to carry out its instructions."""
