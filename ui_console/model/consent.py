@@ -9,6 +9,7 @@ Rules of this file: no bus, no clock, no screen; times are mission seconds and a
 * A yes that releases the robot answers only the first question for it; the other askers get the name of the first
   asker.
 * If the operator releases the robot, every question for it is answered yes; if another ARC gets it, no.
+* If the asker no longer waits, or its console is gone, the question is closed: a yes would release the robot in vain.
 """
 
 from __future__ import annotations
@@ -50,6 +51,16 @@ class AskConsent(Message, frozen=True):
     robot: Mention
     user: Mention
     why: Annotated[str, msgspec.Meta(max_length=MAX_WHY)]
+
+
+class WithdrawConsent(Message, frozen=True):
+    """Close the question of the sender for a robot, because its operator no longer waits; answered by a ``Consent``.
+
+    Attributes:
+        user: The person who asked.
+    """
+
+    user: Mention
 
 
 class Consent(Message, frozen=True):
@@ -204,6 +215,12 @@ class ConsentDesk:
     def ended(self, is_given: bool, reason: str) -> list[Settled]:
         """Settle all questions for the robot, because this console no longer holds it."""
         return self._close_takes(Consent(is_given, self._user, reason))
+
+    def withdrawn(self, asker: str, user: str, topic: Topic) -> list[Settled]:
+        """Settle the question of this person at this console with no, because no one waits for the answer."""
+        over = [one for one in self._open if one.key == (asker, user, topic)]
+        self._open = [one for one in self._open if one not in over]
+        return [Settled(one, Consent(False, self._user, "withdrawn")) for one in over]
 
     def _close_takes(self, consent: Consent) -> list[Settled]:
         settled = [Settled(one, consent) for one in self._open if one.topic is Topic.TAKE]

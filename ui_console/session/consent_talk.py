@@ -6,6 +6,7 @@ This file has both sides, because each console may wait for a robot or hold one.
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
@@ -25,12 +26,15 @@ from ui_console.model.consent import (
     NoOperatorToAsk,
     Settled,
     Topic,
+    WithdrawConsent,
     require_console,
 )
 from ui_console.model.events import ConsentAsked, ConsentHeard, failed
 from ui_console.model.order_facts import operator_of
 from ui_console.session.feed import REPLY_TIME_S
 from ui_console.session.observer import AnyObserver
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +65,7 @@ class ConsentTalk:
         self._console, self._give_back = console, give_back
         console.answers.yield_robot = self._begin_to_yield
         self._unanswered = 0
+        self._open: dict[str, AskConsent] = {}
 
     def begin_ask(self, claim: Claim | None, why: str = "") -> None:
         """Ask the consoles that hold the robot, and show their answers; if such a question is open, do nothing.
@@ -72,6 +77,24 @@ class ConsentTalk:
         if self._unanswered == 0:
             self._unanswered = 1
             self._console.start_task(self._ask(claim, why), "consent")
+
+    def withdraw(self, got: str = "") -> None:
+        """Close the open questions, because this console waits no longer.
+
+        Args:
+            got: The robot that it has; the console that had it answers questions for it. Empty: none.
+        """
+        over = [holder for holder, question in self._open.items() if question.robot != got]
+        for holder in over:
+            del self._open[holder]
+            self._console.start_task(self._withdraw_from(holder), "withdraw consent")
+
+    async def _withdraw_from(self, holder: str) -> None:
+        question = WithdrawConsent(self._console.user)
+        try:
+            await self._console.bus.ask(holder, question, Consent, within_s=REPLY_TIME_S)
+        except (Refusal, LinkError) as error:  # the question times out there
+            log.info("%s did not close the question: %s", holder, error)
 
     async def _ask(self, claim: Claim | None, why: str) -> None:
         console = self._console
@@ -114,6 +137,7 @@ class ConsentTalk:
 
     async def _ask_one(self, holder: str, question: AskConsent) -> None:
         console = self._console
+        self._open[holder] = question
         try:
             consent = await console.bus.ask(holder, question, Consent, within_s=CONSENT_WITHIN_S + REPLY_TIME_S)
         except NoResponder:  # a console that is gone holds no robot, because its ARC ends with it
@@ -123,6 +147,9 @@ class ConsentTalk:
         except Refusal as refusal:
             consent = Consent(False, component_of(holder), refusal.detail)
         self._unanswered -= 1
+        is_withdrawn = self._open.pop(holder, None) is None
+        if is_withdrawn and not consent.is_given:
+            return
         if not consent.is_given:
             because = consent.reason or "no reason given"
             console.publish_event(

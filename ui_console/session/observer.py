@@ -81,7 +81,7 @@ class Observer(Component[P_co], Generic[P_co]):
         """Its subscriptions, and the verbs that need no grant."""
         self.map = MapFeed(bus, clock, self.show) if has_map else None
         """Its subscription to places; None: it shows no map."""
-        self.answers = answers or ConsentAnswers(self.user, clock, self.show, self.acted)
+        self.answers = answers or ConsentAnswers(bus, self.user, clock, self.show, self.acted)
         """The questions to its operator."""
         self._stops: set[asyncio.Task[object]] = set()
         self._was_cut = False

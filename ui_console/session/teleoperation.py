@@ -25,7 +25,7 @@ from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import ArcNotice, Frame
 from ui_console.model import events
 from ui_console.model.arc_abilities import ArcAbilities
-from ui_console.model.consent import AskConsent, Consent
+from ui_console.model.consent import AskConsent, Consent, WithdrawConsent
 from ui_console.model.driving import Command, GiveWish, Motion
 from ui_console.model.lifting import AskLift
 from ui_console.model.orders import Order
@@ -61,7 +61,7 @@ class Teleoperation(OrderVerbs):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
     fixed: ClassVar[frozenset[str]] = frozenset({"robot", "kind", "sight", "away_after_s"})  # read when it begins
-    accepts: ClassVar[Accepts | None] = ArcNotice | AskConsent | AskHandOver | AskLift | ChildReport
+    accepts: ClassVar[Accepts | None] = ArcNotice | AskConsent | WithdrawConsent | AskHandOver | AskLift | ChildReport
 
     def __init__(
         self,
@@ -80,7 +80,12 @@ class Teleoperation(OrderVerbs):
         user: str = "",
         answers: ConsentAnswers | None = None,
     ) -> None:
-        super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
+        def seen(event: events.ConsoleEvent) -> None:
+            show(event)
+            if isinstance(event, events.Granted | events.GivenBack):
+                self._consent.withdraw(event.robot if isinstance(event, events.Granted) else "")
+
+        super().__init__(launch, bus, clock, show=seen, watches=watches, signs_in=signs_in, user=user, answers=answers)
         self._work, self._takes, self._first_orders = work, takes, orders
         self._kind = self.parameters.kind
         self._controls = Controls(self)
@@ -297,6 +302,9 @@ class Teleoperation(OrderVerbs):
         """Answer the ARC's notices and the questions of other consoles for the robot or a lift of a stop."""
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once(asked.body.robot))
+        if isinstance(asked.body, WithdrawConsent):
+            self.answers.withdrawn(asked.source, asked.body.user)
+            return Consent(False, self.user, "withdrawn")
         if isinstance(asked.body, AskHandOver):
             return await self._hand_over.answer(asked.body, *self._held_since(asked.body.robot), self._work is not None)
         if isinstance(asked.body, AskLift) and self._work is not None:

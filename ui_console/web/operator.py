@@ -99,7 +99,8 @@ class Operator:
         self.key_sight: KeySight = KeySight() if former is None else former.key_sight
         """The messages on the bus that this page shows."""
         self.model = ConsoleModel(welcome.user, welcome.user, services.team)
-        self.answers = ConsentAnswers(welcome.user, services.clock, self.show, services.observer.acted)
+        observer = services.observer
+        self.answers = ConsentAnswers(observer.bus, welcome.user, services.clock, self.show, observer.acted)
         """The questions of others to this person."""
         self._services = services
         self._console = OwnConsole(self._new_console, self._show_failed, services.observer.fail)

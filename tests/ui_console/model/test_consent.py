@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.model.consent import CONSENT_WITHIN_S, MOST_OPEN, AskConsent, AskedAlready, ConsentDesk, TooManyAsk
+from ui_console.model.consent import (
+    CONSENT_WITHIN_S,
+    MOST_OPEN,
+    AskConsent,
+    AskedAlready,
+    ConsentDesk,
+    TooManyAsk,
+    Topic,
+)
 
 ASK = AskConsent("scout1", "ben", "my robot is stuck")
 steps = st.lists(
@@ -16,6 +24,7 @@ steps = st.lists(
         st.tuples(st.just("decide_late"), st.integers(0, 3)),
         st.tuples(st.just("wait"), st.floats(0, 10)),
         st.tuples(st.just("ended"), st.booleans()),
+        st.tuples(st.just("withdrawn"), st.integers(0, 3)),
     ),
     max_size=30,
 )
@@ -55,6 +64,12 @@ def test_each_question_gets_exactly_one_answer_and_none_stays_open_longer_than_p
                 assert not any(answer.consent.is_given for answer in late)
                 settled += [answer.sought for answer in late]
                 assert all(one.until_s > now_s for one in desk.open)
+            case "withdrawn":
+                asker = f"ui_console/{with_what}"
+                over = desk.withdrawn(asker, ASK.user, Topic.TAKE)
+                assert not any(answer.consent.is_given for answer in over)
+                settled += [answer.sought for answer in over]
+                assert asker not in {one.asker for one in desk.open}
             case "ended":
                 settled += [answer.sought for answer in desk.ended(bool(with_what), "released")]
                 assert not desk.open

@@ -216,3 +216,55 @@ def test_programs_that_ask_for_consent_are_refused(stage: Callable[[Scene], None
             await on.placer.bus.ask(on.anna.console.address, question, Consent, within_s=1.0)
 
     stage(scene)
+
+
+async def question_closes(on: Stage) -> float:
+    """Return the seconds until Anna's screens show the question no more."""
+    began_s = on.clock.now_s()
+    await on.until(lambda: on.anna.model.consent(on.clock.now_s()) is None)
+    return on.clock.now_s() - began_s
+
+
+def test_the_question_of_a_console_that_ended_is_closed_soon(stage: Callable[[Scene], None]) -> None:
+    """A yes released the robot for nobody."""
+
+    async def scene(on: Stage) -> None:
+        on.ben.console.begin_ask_consent()
+        await on.anna_is_asked()
+        on.ben.console.end("ben goes home")
+        assert await question_closes(on) < CONSENT_WITHIN_S / 4
+        on.anna.console.decide(True)
+        assert on.anna.console.is_held
+
+    stage(scene)
+
+
+def test_a_question_is_closed_at_once_where_its_asker_waits_no_longer(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        for _turn in (1, 2):
+            on.ben.console.begin_ask_consent()
+            await on.anna_is_asked()
+            await on.ben.console.give_back("no longer needed")
+            assert await question_closes(on) < 0.5
+            on.anna.console.decide(True)
+            assert on.anna.console.is_held
+            on.ben.console.take()
+            await on.clock.sleep_s(0.5)
+        told = [event.what for event in on.ben.console.story.of("scout1")]
+        assert not [what for what in told if what.startswith("anna keeps it")]
+
+    stage(scene)
+
+
+def test_a_question_is_closed_at_once_where_its_asker_has_another_robot(stage: Callable[[Scene], None]) -> None:
+    """As when its claim for any robot got another one."""
+
+    async def scene(on: Stage) -> None:
+        on.ben.console.begin_ask_consent()
+        await on.anna_is_asked()
+        arc = on.placer.arcs["ben-drive"]
+        arc.rcs = {**arc.rcs, "scout": "scout2"}
+        await arc.grant()
+        assert await question_closes(on) < 0.5
+
+    stage(scene)
