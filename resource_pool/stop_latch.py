@@ -30,6 +30,7 @@ class StopLatch:
     def __init__(self, rc: str, state: StopState | None = None) -> None:
         self.state = state or StopState(rc, False, 0, "", "", 0.0)
         """The present state."""
+        self._began = self.state.number  # number of the first order of the stop in force
 
     def stop(self, by: str, reason: str, now_s: float, console: str = "") -> bool:
         """Stop the robot; return True if the robot could move, or if this author had not stopped it yet.
@@ -41,6 +42,7 @@ class StopLatch:
         state, author = self.state, Stopper(by, console)
         if not state.is_stopped:
             self.state = StopState(state.rc, True, state.number + 1, by, reason, now_s, console=console)
+            self._began = self.state.number
             return True
         is_new = author not in (Stopper(state.by, state.console), *state.also)
         also = _fitting([*state.also, author]) if is_new else state.also
@@ -51,6 +53,7 @@ class StopLatch:
         """Put a stop of the RC's former process in force; return False if a later order is known here."""
         if stop.number <= self.state.number:
             return False
+        self._began = stop.number
         (first, *also), rc = stop.authors or [Stopper(stop.by)], self.state.rc
         self.state = StopState(
             rc, True, stop.number, first.by, stop.reason, stop.since_s, stop.is_confirmed, first.console, also
@@ -66,9 +69,14 @@ class StopLatch:
         by = ", ".join(dict.fromkeys(author.by for author in authors))
         return StandingStop(state.number, by, state.reason, state.at_s, state.is_confirmed, authors)
 
-    def confirm(self, is_confirmed: bool) -> None:
-        """If the robot is still stopped, record whether the radio accepted the packet that stops the wheels."""
-        if self.state.is_stopped:
+    def confirm(self, is_confirmed: bool, number: int | None = None) -> None:
+        """If the robot is still stopped, record whether the radio accepted the packet that stops the wheels.
+
+        Args:
+            number: Number of the last order to stop when the packet was made: if the robot was freed since, the packet
+                says nothing about the stop in force. None: the packet is of the stop in force.
+        """
+        if self.state.is_stopped and (number is None or number >= self._began):
             self.state = msgspec.structs.replace(self.state, is_confirmed=is_confirmed)
 
     def lift(self, number: int, by: str, now_s: float) -> bool:

@@ -260,20 +260,20 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     async def _try_stop(self) -> None:
         """Confirm the stop if the radio accepts its packet, or if no packet of a former holder moves the robot soon."""
-        holder = self._holder
+        holder, number = self._holder, self._latch.state.number
         if holder is None:
             # A former holder's last packet was a safe one, or the radio was late, or sends no more.
             until_s = min(self._at_rest_s, self.clock.now_s() + RADIO_REPLY_S * self.clock.rate)
             await self.clock.sleep_until_s(until_s)
-            self._latch.confirm(self._at_rest_s <= until_s)  # not the time of the clock: a wait may end a little early
+            self._latch.confirm(self._at_rest_s <= until_s, number)  # not by the clock: a wait may end a little early
             return
         try:
             await self._load(holder, self.stop_packet())
         except (Refusal, LinkError) as error:  # the robot halts by itself when its last drive expires
             self.story.note(holder.arc, f"the stop was not sent: {error}")
-            self._latch.confirm(False)
+            self._latch.confirm(False, number)
         else:
-            self._latch.confirm(True)
+            self._latch.confirm(True, number)
             self._tell_halted(holder)
 
     def _follow_stop(self) -> None:

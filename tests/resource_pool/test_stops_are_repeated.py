@@ -36,12 +36,13 @@ class FaultyRadio:
     Attributes:
         works: True: it accepts packets.
         is_silent: True: while it does not work, it answers nothing.
-        asked_s: Mission times of the packets.
+        holds_back: Set when it may answer the packets that it accepts; None: at once.
     """
 
     pool: Pool
     works: bool = False
     is_silent: bool = False
+    holds_back: asyncio.Event | None = None
     asked_s: list[float] = field(default_factory=list)
     payloads: list[bytes] = field(default_factory=list)
     numbers: list[int] = field(default_factory=list)
@@ -52,6 +53,8 @@ class FaultyRadio:
             await asyncio.Event().wait()
         if not self.works:
             raise HardwareFault("the antenna fell off")
+        if self.holds_back is not None:
+            await self.holds_back.wait()
         self.payloads.append(asked.body.payload)
         self.numbers.append(asked.body.robot_stop)
         return PacketLoaded()
@@ -149,5 +152,26 @@ def test_the_next_holders_radio_confirms_a_stop_of_before(local_mission: Any) ->
             await connect(pool, "scout1", "two", 8, companions={"scout1": 8, "radio": 9})
             await pool.clock.sleep_s(2 * RADIO_REPLY_S)
             assert (await ask_stop(operator, "scout1")).is_confirmed
+
+    run_virtual(main())
+
+
+def test_the_answer_to_an_earlier_stop_does_not_confirm_a_later_one(local_mission: Any) -> None:
+    """The radio took the earlier one before the robot was freed, and moved it since."""
+
+    async def main() -> None:
+        async with a_faulty_radio(local_mission) as (pool, radio):
+            operator, answered = pool.voice_of(OPERATOR), asyncio.Event()
+            radio.works, radio.holds_back = True, answered
+            first = asyncio.create_task(stop_robot(operator, "scout1", ""))
+            await pool.clock.sleep_s(0.1)
+            radio.holds_back = None
+            await lift_stop(operator, await ask_stop(operator, "scout1"))
+            radio.works = False
+            later = await stop_robot(operator, "scout1", "")
+            assert not later.is_confirmed
+            answered.set()
+            await first
+            assert not (await ask_stop(operator, "scout1")).is_confirmed
 
     run_virtual(main())
