@@ -64,7 +64,7 @@ class NoMessage(WiringFault):
 
 
 class NoRounds(WiringFault):
-    """A unit would never have a round; ``modules`` are all its modules."""
+    """A unit would never have a round; the port is the unit."""
 
 
 class NoQuality(WiringFault):
@@ -178,7 +178,7 @@ def _no_rounds(graph: Graph, units: Sequence[UnitOrder]) -> Iterator[WiringFault
     for unit in units:
         if not unit.frequency_hz and not graph.awaited(unit.name):
             detail = f"unit {unit.name} never runs: it has no frequency, and no fresh input from outside"
-            yield NoRounds(tuple(one.name for one in unit.modules), "", detail, 'Write frequency-hz="…"')
+            yield NoRounds((), unit.name, detail, 'Write frequency-hz="…"')
 
 
 def judged(question: UnitsQuestion) -> Arranged:
@@ -200,7 +200,7 @@ def judged(question: UnitsQuestion) -> Arranged:
     try:
         parameters = arranged(units, given, qualities)
     except GraphRefused as refused:
-        return Arranged(faults=tuple(_of_graph(fault, units) for fault in refused.faults))
+        return Arranged(faults=tuple(_of_graph(fault) for fault in refused.faults))
     return Arranged({unit: msgspec.to_builtins(one) for unit, one in parameters.items()})
 
 
@@ -225,11 +225,10 @@ def _of_given(key: str, declared: GivenKey) -> Iterator[UnitFault]:
         yield UnitFault(refusal.detail, remedy, given=key)
 
 
-def _of_graph(fault: WiringFault, units: Sequence[UnitOrder]) -> UnitFault:
+def _of_graph(fault: WiringFault) -> UnitFault:
     about, *_ = (*fault.modules, "")
     if isinstance(fault, NoQuality):
         return UnitFault(fault.detail, fault.remedy, quality=fault.port)
     if isinstance(fault, NoRounds):
-        unit = next(unit.name for unit in units if [one.name for one in unit.modules] == list(fault.modules))
-        return UnitFault(fault.detail, fault.remedy, unit=unit)
+        return UnitFault(fault.detail, fault.remedy, unit=fault.port)
     return UnitFault(fault.detail, fault.remedy, module=about, port=fault.port)

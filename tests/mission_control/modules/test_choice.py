@@ -12,7 +12,8 @@ from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus
 from backbone.component.messages import Parameters, SetParameter, WrongParameter
 from backbone.keys import Conversation
-from mission_control.modules.arrangement import UnitOrder, arranged
+from backbone.mission.arranged import UnitsQuestion
+from mission_control.modules.arrangement import UnitOrder, arranged, judged
 from mission_control.modules.choice import ChoiceOrder
 from mission_control.modules.graph import GraphRefused
 from mission_control.modules.module import Module
@@ -30,6 +31,14 @@ class Listing(Module):
 
     def update(self, inputs: Any) -> Outputs:
         return self.Outputs([])
+
+
+class Numbering(Module):
+    class Outputs(Module.Outputs):
+        number: Number
+
+    def update(self, inputs: Any) -> Outputs:
+        return self.Outputs(Number(1))
 
 
 @pytest.mark.parametrize("is_apart", [False, True])
@@ -84,3 +93,12 @@ def test_a_choice_that_cannot_be_is_refused(choices: list[ChoiceOrder], says: st
     unit = UnitOrder(name="one", modules=[DOUBLE, FOURFOLD, SUMMING, listing], choices=choices)
     with pytest.raises(GraphRefused, match=says):
         arranged([unit], NUMBERS)
+
+
+def test_a_unit_that_only_chooses_between_its_own_keys_is_named_if_it_never_runs() -> None:
+    listings = [
+        {"name": name, "class_path": f"{__name__}:Numbering", "outputs": {"number": name}} for name in ("one", "two")
+    ]
+    unit = {"name": "still", "modules": listings, "choices": [{"key": "number", "source": "one", "others": ["two"]}]}
+    [fault] = judged(UnitsQuestion("", ({"name": "runs", "frequency_hz": 1.0, "modules": []}, unit), {})).faults
+    assert (fault.unit, fault.remedy) == ("still", 'Write frequency-hz="…"')
