@@ -122,7 +122,8 @@ def handed_over(old: Module, new: Module) -> bool:
     fields = _fields(old.State)
     if not fields or fields != _fields(new.State):
         return False
-    new.state = new.State(**{name: copy.deepcopy(getattr(old.state, name)) for name in fields})
+    values = {name: getattr(old.state, name) for name in fields}
+    new.state = new.State(**copy.deepcopy(values))  # one copy, so that two fields still share objects
     return True
 
 

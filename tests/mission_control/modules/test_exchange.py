@@ -269,6 +269,19 @@ def test_state_is_copied_because_both_run() -> None:
     assert (old.state.got, new.state.got) == ([1.0], [1.0, 2.0])
 
 
+def test_two_fields_of_a_state_share_an_object_after_the_exchange_too() -> None:
+    class Tracks(Module):
+        class State(Module.State):
+            every: list[list[float]] = []
+            best: list[float] = []
+
+    old, new = Tracks(), Tracks()
+    old.state.every = [old.state.best]
+    assert handed_over(old, new)
+    assert new.state.every[0] is new.state.best
+    assert new.state.best is not old.state.best
+
+
 def test_another_state_is_not_handed_over() -> None:
     old, new = Tally(), Stateless()
     old.update(old.Inputs(Number(1.0)))
