@@ -84,7 +84,7 @@ class Exchange(ExchangeCourse):
             self.unready = self.unready and ": its inputs did not come together"  # unless they did in an earlier round
             return kept
         self.unready = ""
-        if not set(kept or ()) - set(turned) and self.tried(now_s, self._is_ready):
+        if not set(kept or ()) - set(turned) and self.tried(now_s, lambda: bool(self._is_ready())):
             self.switch(now_s)
         return kept
 

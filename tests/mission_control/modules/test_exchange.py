@@ -8,6 +8,7 @@ from threading import Lock
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 from examples import share
 from hypothesis import given, settings
@@ -259,6 +260,12 @@ def test_a_module_that_ends_the_process_only_ends_its_exchange(ending: BaseExcep
     exchange = begun()
     assert exchange.round(0.0, lambda: {"a": 1}, leaving) == {"a": 1}
     assert exchange.cause.startswith(type(ending).__name__)
+
+
+def test_an_answer_that_is_neither_ready_nor_not_ends_the_exchange() -> None:
+    exchange = Exchange(ExchangeRules(1.0, 1.0), lambda: np.array([True, False]), lambda: None, 0.0)  # type: ignore[arg-type, return-value]
+    assert exchange.round(0.0, lambda: {"a": 1}, lambda: {"a": 2}) == {"a": 1}
+    assert exchange.cause.startswith("ValueError: The truth value of an array")
 
 
 def test_state_is_copied_because_both_run() -> None:
