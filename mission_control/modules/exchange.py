@@ -22,7 +22,7 @@ from collections.abc import Callable, Mapping
 import msgspec
 
 from backbone.errors import complaint
-from backbone.exchange_course import ExchangeCourse, ExchangePhase, ExchangeRules
+from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules
 from mission_control.modules.module import Module
 from mission_control.modules.ports import type_name
 
@@ -94,7 +94,7 @@ class Exchange(ExchangeCourse):
             return old()
         try:
             kept = old()
-        except Exception as error:
+        except UNPROVED as error:
             self.end(ExchangePhase.PROVED, now_s, f"the old one failed beside it and is gone: {complaint(error)}")
             return turned
         if silent := self._silent(now_s, kept or {}, turned or {}):

@@ -262,6 +262,17 @@ def test_a_module_that_ends_the_process_only_ends_its_exchange(ending: BaseExcep
     assert exchange.cause.startswith(type(ending).__name__)
 
 
+@pytest.mark.parametrize("ending", [SystemExit(3), KeyboardInterrupt(), ValueError()], ids=repr)
+def test_an_old_one_that_ends_the_process_only_ends_the_exchange(ending: BaseException) -> None:
+    def leaving() -> Turned:
+        raise ending
+
+    exchange = begun()
+    rounds_of(exchange, old={"a": 1}, new={"a": 2}, count=1)
+    assert exchange.round(0.1, leaving, lambda: {"a": 2}) == {"a": 2}
+    assert exchange.phase is ExchangePhase.PROVED
+
+
 def test_an_answer_that_is_neither_ready_nor_not_ends_the_exchange() -> None:
     exchange = Exchange(ExchangeRules(1.0, 1.0), lambda: np.array([True, False]), lambda: None, 0.0)  # type: ignore[arg-type, return-value]
     assert exchange.round(0.0, lambda: {"a": 1}, lambda: {"a": 2}) == {"a": 1}
