@@ -128,7 +128,10 @@ def _is_of(value: object, kind: object) -> bool:
         return type(value) is kind
     if get_origin(kind) is not None or not isinstance(kind, type):
         return True
-    return isinstance(value, (float, int) if kind is float else kind)
+    try:
+        return isinstance(value, (float, int) if kind is float else kind)
+    except TypeError:  # a protocol, a typed dictionary, Any
+        return True
 
 
 def judge_of_sent(

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol, TypedDict
 
+import msgspec
 import numpy as np
 import pytest
 from examples import share
@@ -237,3 +238,26 @@ def test_what_is_no_output_goes_to_nobody_and_is_a_bug_with_the_name_of_its_modu
     unit = ExecutionUnit("one", graph, {"faulty": Faulty(returned)}, Trigger(1.0), stopwatch=lambda: 0.0)
     with pytest.raises((RuntimeError, WrongModule), match=told):
         unit.run(0.0)
+
+
+class Valued(Protocol):
+    value: float
+
+
+class Record(TypedDict):
+    value: float
+
+
+@pytest.mark.parametrize("kind", [Any, Valued, Record], ids=str)
+def test_a_port_may_have_a_class_with_which_no_value_can_be_compared(kind: Any) -> None:
+    outputs, value = msgspec.defstruct("Outputs", [("it", kind)], bases=(Module.Outputs,)), {"value": 1.0}
+
+    class Free(Module):
+        Outputs = outputs  # type: ignore[assignment]
+
+        def update(self, inputs: Module.Inputs) -> Any:
+            return outputs(value)
+
+    graph = Graph({"one": [Member("free", Free.ports())]}, {})
+    unit = ExecutionUnit("one", graph, {"free": Free()}, Trigger(1.0), stopwatch=lambda: 0.0)
+    assert unit.run(0.0) == [("it", value)]
