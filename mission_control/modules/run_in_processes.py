@@ -28,7 +28,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, Statistics
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.waiting import settle
@@ -183,11 +183,10 @@ async def _accompany(
         for child in children:
             _subscribe(hub, child.launch, listen, fell)
             await _begin(hub, child, endpoint, fell)
-        try:
-            async with asyncio.timeout(for_s if for_s < math.inf else None):
-                raise ModuleProcessFell(f"the process of {await fell} ended")
-        except TimeoutError:
-            return {child.launch.name: await _statistics(hub, child.launch) for child in children}
+        await asyncio.wait({fell}, timeout=for_s if for_s < math.inf else None)
+        if fell.done():
+            raise ModuleProcessFell(f"the process of {fell.result()} ended")
+        return {child.launch.name: await _statistics(hub, child.launch) for child in children}
     finally:
         for child in children:
             loop.remove_reader(child.process.sentinel)
@@ -211,6 +210,8 @@ def _hand_on(listener: Listener, fell: asyncio.Future[str], output: Envelope[Mes
     """Call the listener; its exception ends the run, as it does in one process."""
     try:
         listener(output.body)
+    except StopIteration as error:  # no future can hold it
+        settle(fell, RuntimeError(complaint(error)))
     except (Exception, SystemExit) as error:
         settle(fell, error)
 
