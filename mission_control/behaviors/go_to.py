@@ -88,11 +88,14 @@ class Goer(Driver[W]):
             position = await self.locate(self.parameters.localizer, robot)
             motion = way.decide(position, self.clock.now_s())
             if way.is_over:
+                await self.held.halt()
+            if way is not self.way:  # the parameters changed meanwhile
+                continue
+            if way.is_over:
                 break
             self.report(f"{robot} goes to {_spoken(way.place)}")
             await self.move(motion)
             await self.clock.sleep_s(DECIDE_EVERY_S)
-        await self.held.halt()
         if way.failure:
             self.give_up(NotThere(f"{robot} is not at {_spoken(way.place)}: {way.failure}"))
         else:
@@ -115,6 +118,8 @@ class Goer(Driver[W]):
 
     async def _set_out(self, robot: str) -> Way:
         given, place = self.parameters, await self.place(robot)
+        while given is not self.parameters:  # they changed meanwhile
+            given, place = self.parameters, await self.place(robot)
         self.way = Way(
             place,
             speed_m_s=given.speed_m_s,
