@@ -94,6 +94,11 @@ class Driver(Behavior[D]):
         """Move at these speeds until the next call, for at most half a second."""
         await self.held.move(motion.forward_m_s, motion.turn_rad_s)
 
+    async def halted(self, given: BehaviorParameters) -> bool:
+        """Stop the robot; return False if its parameters are no longer these, so that the work is not over."""
+        await self.held.halt()
+        return given is self.parameters
+
     async def locate(self, localizer: str, robot: str) -> Position:
         """Return the localizer's estimate of the position of the robot or another body.
 

@@ -72,14 +72,13 @@ class Hide(Driver[HideParameters]):
 
     async def drive_on(self, robot: str) -> None:
         """Carry out the decision of each picture; see ``Driver.drive_on``."""
-        while not self.search.is_final:
+        while not (self.search.is_final and await self.halted(self.parameters)):
             self.report(f"{robot} {self.search.stage}, {self._seen()}")
             await self._fresh.wait()
             self._fresh.clear()
             if self._unusable is not None:
                 raise self._unusable
             await self.move(self._motion)
-        await self.held.halt()
         is_hidden = self.search.stage is SearchStage.HIDDEN
         self.finish(BehaviorStatus.SUCCESS if is_hidden else BehaviorStatus.FAILURE, {"looks": self.search.looks})
 

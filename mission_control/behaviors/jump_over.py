@@ -64,22 +64,21 @@ class JumpOver(Driver[JumpOverParameters]):
 
     async def drive_on(self, robot: str) -> None:
         """Decide ten times a second from the robot's position; see ``Driver.drive_on``."""
-        while True:
+        while not (self.course.is_final and await self.halted(self.parameters)):
             position = await self.locate(self.parameters.localizer, robot)
-            match self.course.decide(position, self.clock.now_s()):
+            course = self.course
+            match course.decide(position, self.clock.now_s()):
                 case Motion() as motion:
                     await self.move(motion)
                 case Act.JUMP:
                     await self.held.jump()
-                    self.course.jumped()
-                    self.story.note(robot, f"jumps, number {self.course.jumps}")
+                    course.jumped()  # the robot may get another course meanwhile
+                    self.story.note(robot, f"jumps, number {course.jumps}")
                 case Act.WAIT:
                     pass
             self.report(f"{robot} {self.course.stage}, {self.course.jumps} jumps")
-            if self.course.is_final:
-                break
-            await self.clock.sleep_s(DECIDE_EVERY_S)
-        await self.held.halt()
+            if not self.course.is_final:
+                await self.clock.sleep_s(DECIDE_EVERY_S)
         is_over = self.course.stage is JumpStage.OVER
         self.finish(BehaviorStatus.SUCCESS if is_over else BehaviorStatus.FAILURE, {"jumps": self.course.jumps})
 

@@ -58,13 +58,12 @@ class Patrol(Driver[PatrolParameters]):
     async def drive_on(self, robot: str) -> None:
         """Decide ten times a second from the robot's position; see ``Driver.drive_on``."""
         self._say(robot)
-        while not self.route.is_over:
+        while not (self.route.is_over and await self.halted(self.parameters)):
             position = await self.locate(self.parameters.localizer, robot)
             motion = self.route.decide(position, self.clock.now_s())
             self._publish(robot)
             await self.move(motion)
             await self.clock.sleep_s(DECIDE_EVERY_S)
-        await self.held.halt()
         self.finish(BehaviorStatus.SUCCESS, self._found())
 
     def interrupted(self) -> None:

@@ -65,7 +65,7 @@ class ReturnToPickup(Servo[PickupParameters]):
 
     async def drive_on(self, robot: str) -> None:
         """Drive to the place ``near``, then by sight; see ``Driver.drive_on``."""
-        while self.route.stage is not PickupStage.FAILED:
+        while not (self.route.stage is PickupStage.FAILED and await self.halted(self.parameters)):
             if self.route.stage is PickupStage.BY_SIGHT:
                 if await self._go_by_sight(robot):
                     return
@@ -73,7 +73,6 @@ class ReturnToPickup(Servo[PickupParameters]):
                 await self._look(robot)
             else:
                 await self._travel(robot)
-        await self.held.halt()
         self.give_up(TargetNotFound(f"{robot} looked for the mark {self.route.in_vain} times"))
 
     def interrupted(self) -> None:
@@ -122,9 +121,9 @@ class ReturnToPickup(Servo[PickupParameters]):
             self.route.not_found()
             self.search_anew()
             return False
+        given = self.parameters
         await self.follow(robot, step)
-        if step.stage is not Approach.ARRIVED:
+        if step.stage is not Approach.ARRIVED or not await self.halted(given):
             return False
-        await self.held.halt()
         self.arrived()
         return True

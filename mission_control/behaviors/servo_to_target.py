@@ -215,12 +215,13 @@ class ServoToTarget(Servo[ServoParameters]):
         while True:
             step = await self.next_step()
             if self.has_searched(self.parameters.search_turns):
-                await self.held.halt()
+                if not await self.halted(self.parameters):
+                    continue
                 turns = f"{self.parameters.search_turns:g}"
                 self.give_up(TargetNotFound(f"{robot} saw no target in {turns} turns"))
                 return
+            given = self.parameters
             await self.follow(robot, step)
-            if step.stage is Stage.ARRIVED:
-                await self.held.halt()
+            if step.stage is Stage.ARRIVED and await self.halted(given):
                 self.arrived()
                 return

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
-from fake_resource_pool import FakePlacer
+from fake_resource_pool import FakeArc, FakePlacer
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.mission.behavior_orders import behavior_order
 from backbone.wire import Envelope
+from mission_control.behaviors.dark_search import SearchStage
 from mission_control.behaviors.driver import Driver
 from mission_control.behaviors.go_to import GoTo
+from mission_control.behaviors.hide import Hide
+from mission_control.behaviors.jump_over import JumpOver
+from mission_control.behaviors.patrol import Patrol
+from mission_control.behaviors.servo_to_target import ServoToTarget
 from mission_control.messages import BehaviorStatus
-from resource_pool.arc_client import AskFloorPlan, AskPose, FloorPlan, Pose
+from mission_control.vision.servo_law import Stage
+from mission_control.vision.visual_servo import ServoStep
+from resource_pool.arc_client import Applied, AskFloorPlan, AskPose, FloorPlan, Halt, Pose
 
 EYE = "resource_pool/eye"
 GREY = bytes([128]) * (320 * 240)
@@ -52,6 +60,20 @@ async def stand(local_mission: Any, kind: type[Driver[Any]], **parameters: Any) 
         await eye.bus.close()
 
 
+def at_first(behavior: Driver[Any], command: str, act: Callable[[], object]) -> None:
+    """Call ``act`` once, while the behavior waits for the answer to its first command of this name."""
+    client, acts = behavior.held, [act]
+    send = getattr(client, command)
+
+    async def sent(*values: float) -> Applied:
+        applied: Applied = await send(*values)
+        while acts:
+            acts.pop()()
+        return applied
+
+    setattr(client, command, sent)
+
+
 @pytest.mark.parametrize("question", [AskFloorPlan, AskPose])
 def test_another_place_while_the_localizer_is_asked_is_where_it_goes(local_mission: Any, question: type) -> None:
     async def scene() -> None:
@@ -66,3 +88,62 @@ def test_another_place_while_the_localizer_is_asked_is_where_it_goes(local_missi
             assert behavior.payload["x_m"] == 2.0
 
     run_virtual(scene())
+
+
+def hidden(behavior: Hide) -> None:
+    behavior.search.stage = SearchStage.HIDDEN
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters", "before", "changed"),
+    [
+        (GoTo, {"localizer": "eye", "x_m": 0.0, "y_m": 0.0}, None, {"x_m": 2.0}),
+        (Patrol, {"localizer": "eye", "waypoints": "0,0", "rounds": 1}, None, {"waypoints": "2,0"}),
+        (JumpOver, {"localizer": "eye", "front": "-3,0", "heading_deg": 0.0}, None, {"front": "5,0"}),
+        (Hide, {}, hidden, {"leg_m": 0.5}),
+    ],
+)
+def test_a_change_while_it_halts_at_the_end_is_no_end(
+    local_mission: Any,
+    kind: type[Driver[Any]],
+    parameters: dict[str, Any],
+    before: Callable[[Any], None] | None,
+    changed: dict[str, Any],
+) -> None:
+    async def scene() -> None:
+        async with stand(local_mission, kind, **parameters) as (behavior, arc, _eye, placer):
+            if before is not None:
+                before(behavior)
+            at_first(behavior, "halt", lambda: behavior.change_parameters(changed))
+            await arc.grant()
+            await placer.wait(lambda: halts(arc), 5.0)
+            await placer.clock.sleep_s(1.0)
+            assert behavior.status is BehaviorStatus.RUNNING, behavior.payload
+
+    run_virtual(scene())
+
+
+@pytest.mark.parametrize("command", ["move", "halt"])
+def test_a_change_at_the_place_before_the_target_is_no_arrival(local_mission: Any, command: str) -> None:
+    async def scene() -> None:
+        async with stand(local_mission, ServoToTarget) as (behavior, arc, _eye, placer):
+            at_first(behavior, command, lambda: behavior.change_parameters({"stop_m": 0.5}))
+            next_step = behavior.next_step
+
+            async def arriving() -> ServoStep:
+                behavior.next_step = next_step
+                return dataclasses.replace(await next_step(), stage=Stage.ARRIVED)
+
+            behavior.next_step = arriving
+            await arc.grant()
+            await placer.clock.sleep_s(0.1)
+            arc.publish(GREY, 320, 240)
+            await placer.wait(lambda: halts(arc), 5.0)
+            await placer.clock.sleep_s(1.0)
+            assert behavior.status is BehaviorStatus.RUNNING, behavior.payload
+
+    run_virtual(scene())
+
+
+def halts(arc: FakeArc) -> list[Halt]:
+    return [command for _at_s, _epoch, command in arc.commands if isinstance(command, Halt)]
