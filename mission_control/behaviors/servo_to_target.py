@@ -140,7 +140,8 @@ class Servo(Driver[S]):
         Raises:
             UnusablePicture: The pictures do not have the size of a Scout's.
         """
-        await self._fresh.wait()
+        while not self._fresh.is_set():  # ``look_anew`` may come between a picture and the end of this wait
+            await self._fresh.wait()
         self._fresh.clear()
         if self._unusable is not None:
             raise self._unusable

@@ -145,5 +145,27 @@ def test_a_change_at_the_place_before_the_target_is_no_arrival(local_mission: An
     run_virtual(scene())
 
 
+def test_a_change_beside_a_picture_begins_the_approach_anew(local_mission: Any) -> None:
+    async def scene() -> None:
+        async with stand(local_mission, ServoToTarget) as (behavior, arc, _eye, placer):
+            see = behavior.see
+
+            def seen(frame: Any) -> None:
+                see(frame)
+                behavior.change_parameters({"stop_m": 0.5})
+
+            await arc.grant()
+            await placer.clock.sleep_s(0.1)
+            behavior.see = seen
+            arc.publish(GREY, 320, 240)
+            await placer.clock.sleep_s(0.1)
+            behavior.see = see
+            assert not arc.commands
+            arc.publish(GREY, 320, 240)
+            await placer.wait(lambda: arc.commands, 1.0)
+
+    run_virtual(scene())
+
+
 def halts(arc: FakeArc) -> list[Halt]:
     return [command for _at_s, _epoch, command in arc.commands if isinstance(command, Halt)]
