@@ -76,20 +76,23 @@ class Give(Driver[GiveParameters]):
         super().__init__(launch, bus, clock)
         self.held_s = 0.0
         """Time for which the command was in force, over all grants."""
-        self._values: Mapping[str, object] = read_values(self.parameters.values)
+        self._command = self._read()
         self._holding: asyncio.Task[None] | None = None
 
     def parameters_changed(self) -> None:
         """Send the new command now, or at the next grant."""
-        self._values = read_values(self.parameters.values)
+        self._command = self._read()
         if self._holding is not None:
             self._holding.cancel()
 
     async def drive_on(self, robot: str) -> None:
         """Send the command, and hold the ARC."""
         while True:
+            command = self._command
+            await self.held.give(*command)
+            if command != self._command:  # it changed meanwhile
+                continue
             wanted = self.parameters
-            await self.held.give(wanted.word, self._values, wanted.role)
             self.report(f"gives {wanted.word}{f' to {robot}' if robot else ''}")
             left_s = max(0.0, wanted.for_s - self.held_s)
             since_s, lasts_s = self.clock.now_s(), min(left_s, wanted.again_s or left_s)
@@ -99,6 +102,11 @@ class Give(Driver[GiveParameters]):
             finally:
                 self._holding.cancel()
                 self.held_s += self.clock.now_s() - since_s
-            if self.held_s >= self.parameters.for_s - TICK_S:
+            if command == self._command and self.held_s >= self.parameters.for_s - TICK_S:
                 self.finish(BehaviorStatus.SUCCESS)
                 return
+
+    def _read(self) -> tuple[str, Mapping[str, object], str]:
+        """Return word, fields and role of the command."""
+        given = self.parameters
+        return given.word, read_values(given.values), given.role

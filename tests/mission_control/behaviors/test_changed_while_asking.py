@@ -15,6 +15,7 @@ from backbone.mission.behavior_orders import behavior_order
 from backbone.wire import Envelope
 from mission_control.behaviors.dark_search import SearchStage
 from mission_control.behaviors.driver import Driver
+from mission_control.behaviors.give import Give
 from mission_control.behaviors.go_to import GoTo
 from mission_control.behaviors.hide import Hide
 from mission_control.behaviors.jump_over import JumpOver
@@ -23,7 +24,7 @@ from mission_control.behaviors.servo_to_target import ServoToTarget
 from mission_control.messages import BehaviorStatus
 from mission_control.vision.servo_law import Stage
 from mission_control.vision.visual_servo import ServoStep
-from resource_pool.arc_client import Applied, AskFloorPlan, AskPose, FloorPlan, Halt, Pose
+from resource_pool.arc_client import Applied, AskFloorPlan, AskPose, FloorPlan, GiveCommand, Halt, Pose
 
 EYE = "resource_pool/eye"
 GREY = bytes([128]) * (320 * 240)
@@ -165,6 +166,27 @@ def test_a_change_beside_a_picture_begins_the_approach_anew(local_mission: Any) 
             await placer.wait(lambda: arc.commands, 1.0)
 
     run_virtual(scene())
+
+
+def test_a_command_that_changes_while_the_old_one_is_on_its_way_is_given_too(local_mission: Any) -> None:
+    async def scene() -> None:
+        async with stand(local_mission, Give, word="look", values="pan_rad=1.0") as (behavior, arc, _eye, placer):
+            changes: list[dict[str, object]] = [{"values": "pan_rad=2.0"}]
+
+            def required(_command: object) -> None:
+                if changes:
+                    behavior.change_parameters(changes.pop())
+
+            arc.require = required
+            await arc.grant()
+            await placer.wait(lambda: behavior.status is BehaviorStatus.SUCCESS, 5.0)
+            assert [one["pan_rad"] for one in values_given(arc)] == [1.0, 2.0]
+
+    run_virtual(scene())
+
+
+def values_given(arc: FakeArc) -> list[dict[str, Any]]:
+    return [dict(command.values) for _at_s, _epoch, command in arc.commands if isinstance(command, GiveCommand)]
 
 
 def halts(arc: FakeArc) -> list[Halt]:
