@@ -130,13 +130,8 @@ class HostCopies:
     def _connect(self) -> None:
         self._look_again_s = self._loop.time() + LOOK_EACH_S
         for name in (MISSION_SOCKET, HOST_SOCKET):
-            made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-            made.setblocking(False)
-            try:
-                made.connect(os.fspath(self._directory / name))
-            except OSError:
-                made.close()
-            else:
+            with suppress(OSError):  # no recorder listens there, or no descriptors are left
+                made = _connected(self._directory / name)
                 self._socket, self.reach_mission, self.dropped = made, name == MISSION_SOCKET, 0
                 self._loop.add_reader(made, self._ended)
                 return
@@ -181,6 +176,22 @@ class HostCopies:
                 self._loop.add_writer(self._socket, self._send_waiting)
             else:
                 self._loop.remove_writer(self._socket)
+
+
+def _connected(path: Path) -> socket.socket:
+    """Return a connection that never blocks.
+
+    Raises:
+        OSError: There is none.
+    """
+    made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        made.setblocking(False)
+        made.connect(os.fspath(path))
+    except OSError:
+        made.close()
+        raise
+    return made
 
 
 def copies_for(directory: str) -> HostCopies | None:

@@ -8,7 +8,7 @@ import resource
 import socket
 import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -45,6 +45,16 @@ async def listening(folder: Path, heard: Heard, *, is_of_mission: bool = True) -
         yield ear
     finally:
         await ear.close()
+
+
+@contextmanager
+def no_descriptor_left() -> Iterator[None]:
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(map(int, os.listdir("/proc/self/fd"))), limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
 
 
 async def until(holds: Callable[[], bool], what: str) -> None:
@@ -183,18 +193,28 @@ async def test_that_no_file_can_be_opened_is_told_once_and_what_waited_is_heard_
         copies, second = HostCopies(folder), HostCopies(folder)
         copies.send(KEY, b"first")
         second.send(KEY, b"second")
-        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (min(map(int, os.listdir("/proc/self/fd"))), limits[1]))
-        try:
+        with no_descriptor_left():
             await asyncio.sleep(4 * LOOK_EACH_S)
             assert not heard
-        finally:
-            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
         [line] = told
         assert "ulimit" in line
         await until(lambda: len(heard) == 2, "both came")
         copies.close()
         second.close()
+
+
+async def test_a_sender_without_descriptors_goes_on_and_finds_the_recorder_later(folder: Path) -> None:
+    heard = Heard()
+    async with listening(folder, heard):
+        with no_descriptor_left():
+            copies = HostCopies(folder)
+            copies.look_now()
+            assert not copies.find_recorder()
+        copies.look_now()
+        assert copies.find_recorder()
+        copies.send(KEY, b"sense")
+        await until(lambda: bool(heard), "it came")
+        copies.close()
 
 
 async def test_nonsense_on_the_socket_ends_that_connection_alone(folder: Path) -> None:
