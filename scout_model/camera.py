@@ -25,10 +25,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scout_model.composition import model_of
 from scout_model.dimensions import DARKNESS, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
 from scout_model.painter import Painter, only_opengl_shows
-from scout_model.world import STATE, model_of
+from scout_model.world import STATE
 
 MEMO_PICTURES = 16  # chosen: 1.2 MB; a standing robot's view while nothing moves, for each of some robots
 MORE_GEOMS = 200  # chosen: tendons and rangefinders of a robot of one's own; MuJoCo's default of 10 000 takes 10 MB

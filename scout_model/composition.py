@@ -7,6 +7,8 @@ dark places for cameras.
 
 from __future__ import annotations
 
+import copy
+import functools
 import math
 from collections.abc import Mapping
 from importlib import resources
@@ -49,6 +51,7 @@ from scout_model.robot import robot_class
 from scout_model.room_file import add_room
 from scout_model.targets import CARRIER, part_poses
 
+_MODELS_KEPT = 2  # chosen: one experiment or two by turns; some 100 kB each
 _TEXTS_KEPT = 4  # chosen: one experiment or a few by turns; some ten kilobytes each
 _WALL_THICKNESS_M = 0.1  # chosen: a Scout in flight does not pass through within one step
 _MARK_THICKNESS_M = 0.002  # chosen: enough to keep mark and surface apart in the depth buffer across the room
@@ -105,9 +108,21 @@ def _compose(description: WorldDescription, bodies: Mapping[str, str]) -> str:
         _add_target(spec, target)
     try:
         spec.compile()
+        text = str(spec.to_xml())
+        _compiled(text)  # the text has fewer digits than the composed model
     except ValueError as error:
         raise InvalidWorld(f"MuJoCo cannot build it: {error}") from error
-    return str(spec.to_xml())
+    return text
+
+
+def model_of(mjcf: str) -> mujoco.MjModel:
+    """Return MuJoCo's model of this text, which is the caller's own."""
+    return copy.copy(_compiled(mjcf))
+
+
+@functools.lru_cache(maxsize=_MODELS_KEPT)
+def _compiled(mjcf: str) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(mjcf)
 
 
 def _asset(name: str) -> str:

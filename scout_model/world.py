@@ -9,8 +9,6 @@ body touches it or an actuator gets a control other than 0.
 
 from __future__ import annotations
 
-import copy
-import functools
 import math
 from dataclasses import dataclass, field
 
@@ -19,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scout_model.carrier import CarriedPose, trips
-from scout_model.composition import compose
+from scout_model.composition import compose, model_of
 from scout_model.description import RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
@@ -32,22 +30,11 @@ from scout_model.targets import Route, TargetState, part_poses, parts
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """The part of MuJoCo's state that determines a picture."""
 
-_MODELS_KEPT = 2  # chosen: one experiment or two by turns; some 100 kB each
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 _POSITIONS = {_FREE: 7, _BALL: 4, _SLIDE: 1, _HINGE: 1}
 _VELOCITIES = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
-
-
-def model_of(mjcf: str) -> mujoco.MjModel:
-    """Return MuJoCo's model of this text, which is the caller's own."""
-    return copy.copy(_compiled(mjcf))
-
-
-@functools.lru_cache(maxsize=_MODELS_KEPT)
-def _compiled(mjcf: str) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(mjcf)
 
 
 @dataclass(frozen=True, slots=True)

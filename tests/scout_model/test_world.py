@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from scout_model import dimensions, radio_link
+from scout_model.composition import model_of
 from scout_model.description import CLEAN_AIR, Furniture, RobotPlace, Target, WorldDescription
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.scout import Spring
-from scout_model.world import World, model_of
+from scout_model.world import World
 
 NORTH = math.pi / 2
 EMPTY = WorldDescription(
@@ -235,6 +236,7 @@ def test_an_unknown_body_is_refused_by_name(question: str) -> None:
         WorldDescription(9.0, 6.0, robots=[RobotPlace("a", 1, 1.0, 1.0, 0.0), RobotPlace("a", 2, 2.0, 1.0, 0.0)]),
         WorldDescription(9.0, 6.0, robots=[RobotPlace("a/b", 1, 1.0, 1.0, 0.0)]),
         WorldDescription(9.0, 6.0, furniture=[Furniture("t", 1.0, 1.0, 0.0, 1.0, 1.0)]),
+        WorldDescription(9.0, 6.0, furniture=[Furniture("t", 1.0, 1.0, 1e-14, 1.0, 1.0)]),
         WorldDescription(9.0, 6.0, targets=[Target("t", "elephant", [(0.0, 1.0), (1.0, 1.0)], 1.0)]),
         WorldDescription(9.0, 6.0, targets=[Target("t", "pioneer", [(0.0, 1.0), (0.0, 1.0)], 1.0)]),
         WorldDescription(9.0, 6.0, targets=[Target("t", "pioneer", [(0.0, 1.0), (1.0, 1.0)], 0.0)]),
