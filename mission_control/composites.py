@@ -298,17 +298,24 @@ class WithTimeout(Composite):
 
     def suspended(self, name: str, because: str, now_s: float) -> list[Instruction]:
         """Stop or start the timer; see ``Children.suspended``."""
-        is_counted = not because or self.while_suspended is WhileSuspended.COUNT
-        self._watch.run(now_s, running=is_counted)
-        return super().suspended(name, because, now_s)
+        instructions = super().suspended(name, because, now_s)
+        self._run_or_stop(now_s)
+        return instructions
 
     def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
         """Start the timer again if the suspended child was removed; see ``Children.rearranged``."""
-        was_suspended = bool(self.suspensions)
         instructions = super().rearranged(names, anew, now_s)
-        if was_suspended and not self.suspensions:
-            self._watch.run(now_s, running=True)
+        self._run_or_stop(now_s)
         return instructions
+
+    def time_passed(self, now_s: float) -> list[Instruction]:
+        """Stop or start the timer if ``while_suspended`` was changed; see ``Children.time_passed``."""
+        self._run_or_stop(now_s)
+        return super().time_passed(now_s)
+
+    def _run_or_stop(self, now_s: float) -> None:
+        is_counted = not self.suspensions or self.while_suspended is WhileSuspended.COUNT
+        self._watch.run(now_s, running=self._has_begun and is_counted)
 
     def verdict(self, now_s: float) -> FinishParent | None:
         """Return failure when the time is over."""

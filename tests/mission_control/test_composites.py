@@ -257,6 +257,20 @@ def test_a_timeout_stands_still_while_its_child_does() -> None:
     assert finish == FinishParent(FAILURE, {"child": "a", "detail": "a was not done within 10 s"})
 
 
+def test_whether_the_time_of_a_suspension_counts_can_be_changed_during_it() -> None:
+    rules = WithTimeout(["a"], seconds=10.0)
+    begun(rules)
+    rules.suspended("a", "slice by other", 4.0)
+    rules.while_suspended = WhileSuspended.COUNT
+    assert rules.time_passed(6.0) == []
+    assert rules.wakes_at_s == 12.0
+    rules.while_suspended = WhileSuspended.WAIT
+    assert rules.time_passed(7.0) == []
+    assert rules.time_passed(100.0) == []
+    rules.suspended("a", "", 100.0)
+    assert rules.wakes_at_s == 105.0
+
+
 def test_a_timeout_may_count_while_its_child_is_suspended() -> None:
     rules = begun(WithTimeout(["a"], seconds=10.0, while_suspended=WhileSuspended.COUNT))
     rules.suspended("a", "slice", 4.0)
