@@ -214,7 +214,7 @@ class BehaviorExchanges:
         course, clock = going.course, going.old.clock
         while not course.is_over:
             is_warm = course.phase is ExchangePhase.WARMING and going.new.has_begun
-            if is_warm and course.tried(clock.now_s(), going.new.is_ready):
+            if is_warm and course.tried(clock.now_s(), lambda: bool(going.new.is_ready())):
                 await self._take_over(going)
             course.let_pass(clock.now_s())
             if not course.is_over:

@@ -56,12 +56,13 @@ BROKEN = {
     "in its text": ("class Turner(", "class Turner((", "SyntaxError"),
     "when it is made": ("self.turns = 0", "self.turns = 1 / 0", "ZeroDivisionError"),
     "in a field": ("    hands", "    class parameters_type(TurnerParameters):\n        p: 'it' = 1\n    hands", "'it'"),
-    "when it starts": (
-        "    async def act",
-        "    async def start(self):\n        raise OSError('dark')\n\n    async def act",
-        "dark",
-    ),
+    "when it starts": (ACT, f"    async def start(self):\n        raise OSError('dark')\n\n{ACT}", "dark"),
     "when it says whether it is ready": (ACT, f"    def is_ready(self):\n        raise OSError('dim')\n\n{ACT}", "dim"),
+    "when it is neither": (
+        ACT,
+        f"    def is_ready(self):\n        return __import__('numpy').zeros(2)\n\n{ACT}",
+        "truth",
+    ),
     "when it acts": ("self.turns += 1", "raise ValueError('planted')", "planted"),
     "by an exit": ("self.turns += 1", "raise SystemExit(3)", "SystemExit"),
     "by an exit at a grant": (ACT, f"    async def resumed(self, _):\n        raise SystemExit\n\n{ACT}", "SystemExit"),
@@ -71,11 +72,7 @@ BROKEN = {
         "self.finish('failure' and __import__('mission_control.messages').messages.BehaviorStatus.FAILURE)",
         "failure",
     ),
-    "never ready": (
-        "    async def act",
-        "    def is_ready(self):\n        return False\n\n    async def act",
-        "not ready",
-    ),
+    "never ready": (ACT, f"    def is_ready(self):\n        return False\n\n{ACT}", "not ready"),
 }
 
 
