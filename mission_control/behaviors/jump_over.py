@@ -56,6 +56,7 @@ class JumpOver(Driver[JumpOverParameters]):
     """Succeeds when the robot has driven on beyond the obstacle; fails after ``attempts`` unsuccessful jumps."""
 
     parameters_type = JumpOverParameters
+    hands_over = frozenset({"course"})
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

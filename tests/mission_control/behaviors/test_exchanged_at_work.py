@@ -1,0 +1,59 @@
+"""Shipped behaviors whose class is exchanged at work: the new one goes on where the old one was."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_resource_pool import FakePlacer
+from test_changed_while_asking import stand
+
+from backbone.bus.clock import run_virtual
+from backbone.exchange import SwapClass, Swapped
+from mission_control.behaviors.jump_course import LANDED_AFTER_S
+from mission_control.behaviors.jump_over import JumpOver
+from mission_control.messages import BehaviorStatus
+from resource_pool.commands import Jump
+
+OVER = {"localizer": "eye", "front": "5,0", "heading_deg": 0.0}
+RUN_UP, TAKE_OFF, BEYOND = (4.5, 0.0), (4.8, 0.0), (9.0, 0.0)
+
+
+@pytest.fixture
+def exchange(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[FakePlacer, Any], Awaitable[Any]]:
+    """Exchange a behavior's class for one derived from it in another file; give the one that is in charge then."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    async def exchanged(placer: FakePlacer, behavior: Any) -> Any:
+        kind = type(behavior)
+        file = tmp_path / f"again_{kind.__name__.lower()}.py"
+        file.write_text(f"from {kind.__module__} import {kind.__name__}\n\n\nclass Again({kind.__name__}):\n    pass\n")
+        asked = SwapClass(f"{file.stem}:Again", prove_s=0.5)
+        swapped = await placer.bus.ask(behavior.address, asked, Swapped, within_s=10.0)
+        assert (swapped.is_proved, swapped.keeps_state) == (True, True), swapped.cause
+        return behavior.exchanges.present
+
+    return exchanged
+
+
+def test_a_new_class_commands_nothing_before_the_robot_has_landed_and_knows_of_the_jump(
+    local_mission: Any, exchange: Any
+) -> None:
+    async def scene() -> None:
+        async with stand(local_mission, JumpOver, **OVER) as (behavior, arc, eye, placer):
+            eye.at = RUN_UP
+            await arc.grant()
+            await placer.clock.sleep_s(1.0)
+            eye.at = TAKE_OFF
+            await placer.wait(lambda: any(isinstance(command, Jump) for _at_s, _epoch, command in arc.commands), 5.0)
+            jumped_s = placer.clock.now_s()
+            present = await exchange(placer, behavior)
+            eye.at = BEYOND
+            await placer.clock.sleep_s(LANDED_AFTER_S + 1.0)
+            after = [at_s for at_s, _epoch, _command in arc.commands if at_s > jumped_s]
+            assert min(after) >= jumped_s + LANDED_AFTER_S - 0.1
+            assert (present.status, present.payload) == (BehaviorStatus.SUCCESS, {"jumps": 1})
+
+    run_virtual(scene())
