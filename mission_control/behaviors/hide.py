@@ -44,6 +44,7 @@ class Hide(Driver[HideParameters]):
     """Succeeds in a dark place; fails if it finds no dark place."""
 
     parameters_type = HideParameters
+    hands_over = frozenset({"search"})
     needs_arc = "capture"
     never = Driver.never | {UnusablePicture.code}
 

@@ -133,7 +133,8 @@ def test_a_change_at_the_place_before_the_target_is_no_arrival(local_mission: An
 
             async def arriving() -> ServoStep:
                 behavior.next_step = next_step
-                return dataclasses.replace(await next_step(), stage=Stage.ARRIVED)
+                step: ServoStep = await next_step()
+                return dataclasses.replace(step, stage=Stage.ARRIVED)
 
             behavior.next_step = arriving
             await arc.grant()

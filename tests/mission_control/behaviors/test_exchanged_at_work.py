@@ -12,6 +12,8 @@ from test_changed_while_asking import stand
 
 from backbone.bus.clock import run_virtual
 from backbone.exchange import SwapClass, Swapped
+from mission_control.behaviors.give import Give
+from mission_control.behaviors.hide import Hide
 from mission_control.behaviors.jump_course import LANDED_AFTER_S
 from mission_control.behaviors.jump_over import JumpOver
 from mission_control.messages import BehaviorStatus
@@ -55,5 +57,28 @@ def test_a_new_class_commands_nothing_before_the_robot_has_landed_and_knows_of_t
             after = [at_s for at_s, _epoch, _command in arc.commands if at_s > jumped_s]
             assert min(after) >= jumped_s + LANDED_AFTER_S - 0.1
             assert (present.status, present.payload) == (BehaviorStatus.SUCCESS, {"jumps": 1})
+
+    run_virtual(scene())
+
+
+def test_the_time_for_which_a_command_was_held_counts_for_the_new_class_too(local_mission: Any, exchange: Any) -> None:
+    async def scene() -> None:
+        async with stand(local_mission, Give, word="look", for_s=6.0) as (behavior, arc, _eye, placer):
+            await arc.grant()
+            began_s = placer.clock.now_s()
+            await placer.clock.sleep_s(4.0)
+            present = await exchange(placer, behavior)
+            await placer.wait(lambda: present.status is BehaviorStatus.SUCCESS, 10.0)
+            assert placer.clock.now_s() - began_s == pytest.approx(6.0, abs=0.2)
+
+    run_virtual(scene())
+
+
+def test_looks_around_count_for_the_new_class_too(local_mission: Any, exchange: Any) -> None:
+    async def scene() -> None:
+        async with stand(local_mission, Hide, looks=2) as (behavior, arc, _eye, placer):
+            await arc.grant()
+            behavior.search.looks = 1
+            assert (await exchange(placer, behavior)).search.looks == 1
 
     run_virtual(scene())
