@@ -113,7 +113,7 @@ def judge_of(kinds: Mapping[str, object], kind: type[Module], member: Member) ->
                     f"update of {member.name} returned None as {key}, which each round must have",
                     remedy="Give an output that may be left out the default None: 'name: Class | None = None'.",
                 )
-            if value is not None and not _is_of(value, of):
+            if value is not None and not is_of(value, of):
                 raise WrongModule(
                     f"update of {member.name} returned {type_name(type(value))} as {key}, not {type_name(of)}",
                     remedy="Return the declared class, made in update; classes of values stay those that run.",
@@ -122,7 +122,7 @@ def judge_of(kinds: Mapping[str, object], kind: type[Module], member: Member) ->
     return judge
 
 
-def _is_of(value: object, kind: object) -> bool:
+def is_of(value: object, kind: object) -> bool:
     """Return whether the value is of the class, as far as this can be checked; other processes read no subclass."""
     if is_message(kind):
         return type(value) is kind

@@ -21,7 +21,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from backbone.errors import Refusal
 from backbone.naming import did_you_mean
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, Reader, write
+from mission_control.modules.exchangeable import is_of
 from mission_control.modules.module import Module, default_name
+from mission_control.modules.orders import is_message
 from mission_control.modules.ports import Port, Ports, kinds_of_ports, ports_of, type_name
 from mission_control.modules.run import member_of
 
@@ -158,11 +160,10 @@ def check_value(what: str, port: Port, kind: object, value: object) -> None:
         ModuleRuleBroken: The value is not of the class, or could not cross the bus.
     """
     top = typing.get_origin(kind) or kind
-    is_message = isinstance(top, type) and issubclass(top, Message)
-    if isinstance(top, type) and not (type(value) is top if is_message else isinstance(value, top)):
+    if not is_of(value, top):
         remedy = "Messages are of exactly the declared class; an output that may be left out has the default None."
         raise ModuleRuleBroken(f"{what} is {type_name(type(value))}, declared is {port.type}", remedy=remedy)
-    if is_message and isinstance(value, Message):
+    if is_message(top) and isinstance(value, Message):
         most = MAX_LARGE_MESSAGE_BYTES
         try:
             written = write(Envelope(WIRE_VERSION, "kit/kit", 0, 0.0, "", value), most)

@@ -272,3 +272,16 @@ def test_a_graph_is_checked_and_its_modules_are_watched(module_graph: type[Graph
         module_graph(Doubler())
     with pytest.raises(ModuleRuleBroken, match="changed row"):
         module_graph(KeepsItsOutput(), frequency_hz=10.0).advance(1.0)
+
+
+class Measure(Module):
+    class Outputs(Module.Outputs):
+        length: float
+        about: Any
+
+    def update(self, inputs: Any) -> Outputs:
+        return self.Outputs(1, {"unit": "m"})
+
+
+def test_what_a_unit_takes_the_kit_takes_too(module_under_test: MakeModule) -> None:
+    assert module_under_test(Measure()).update() == Measure.Outputs(1, {"unit": "m"})
