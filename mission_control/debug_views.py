@@ -134,7 +134,13 @@ class DebugViews:
             self._add(view, ViewKind.VALUE)
         self._values[view] = value
         if not self._book.is_empty:
-            self._show_newest(view)
+            self._show(view, value)
+
+    def forget(self, prefix: str) -> None:
+        """Forget the views whose names begin so, because another class shows its own from now on."""
+        for view in [name for name in tuple(self._kinds) if name.startswith(prefix)]:
+            del self._kinds[view]
+            self._values.pop(view, None)
 
     def listed(self) -> Views:
         """Return the views shown so far, with their newest values."""
@@ -154,7 +160,7 @@ class DebugViews:
             raise UnknownView(f"there is no view {asked.view!r}{meant}; there is: {known}", view=asked.view)
         until_s = self._book.look(asked.view, self._clock.now_s() + asked.for_s * self._clock.rate)
         if kind is ViewKind.VALUE:
-            self._show_newest(asked.view)
+            self._show(asked.view, self._values.get(asked.view, ""))
         return LookedAt(asked.view, kind, until_s)
 
     def _add(self, view: str, kind: ViewKind) -> None:
@@ -165,10 +171,10 @@ class DebugViews:
             raise ValueError(f"{MOST_VIEWS} views are shown already, {view!r} is one too many")
         self._kinds[view] = kind
 
-    def _show_newest(self, view: str) -> None:
+    def _show(self, view: str, value: Shown) -> None:
         now_s = self._clock.now_s()
         if self._book.take(view, now_s):
-            self._publish(view, ViewValue(view, now_s, sendable(self._values[view])))
+            self._publish(view, ViewValue(view, now_s, sendable(value)))
 
     def _publish(self, view: str, shown: ViewPicture | ViewValue) -> None:
         self._bus.publish(view_address(self._bus.source, view), Conversation.VIEWS, shown)

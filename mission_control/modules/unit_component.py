@@ -77,13 +77,14 @@ class UnitComponent(Component[UnitParameters]):
         self._published = {key: _message_kind(key, made.get(key)) for key in given.published}
         self._views = DebugViews(LoopPublisher(bus) if given.own_thread else bus, clock)
         for name, module in self._modules.items():
-            module.debug = ViewsOfModule(name, self._views)
+            module.debug = self._fresh_views(name)
         self._unit: ExecutionUnit = self._new_unit()
         self._as_started = msgspec.structs.replace(given, chosen={})
         self._choose()
         self._thread: UnitThread | None = None
         self._place: ThreadPlace | None = None
-        self._exchanges = UnitExchanges(self, self._modules, self._graph, lambda: self._unit, self._exchanged)
+        fresh, exchanged = self._fresh_views, self._exchanged
+        self._exchanges = UnitExchanges(self, self._modules, self._graph, lambda: self._unit, fresh, exchanged)
         self._missed, self._report_again_s = 0, -math.inf
         self._misses_text = ""
         self._deadlines = self._new_deadlines()
@@ -91,6 +92,10 @@ class UnitComponent(Component[UnitParameters]):
     def _new_unit(self) -> ExecutionUnit:
         trigger = Trigger(self.parameters.frequency_hz, self.parameters.on_input)
         return ExecutionUnit(self.name, self._graph, self._modules, trigger, self.clock.now_s())
+
+    def _fresh_views(self, module: str) -> ViewsOfModule:
+        self._views.forget(f"{module}-")
+        return ViewsOfModule(module, self._views)
 
     def _new_deadlines(self) -> UnitDeadlines:
         return UnitDeadlines(self, self._into, self._tell)

@@ -27,7 +27,7 @@ from mission_control.modules.exchange import Exchange
 from mission_control.modules.exchangeable import graph_with, judge_of, judge_of_sent, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
 from mission_control.modules.graph import Graph, Member
-from mission_control.modules.module import UNSEEN, Module
+from mission_control.modules.module import UNSEEN, Debug, Module
 from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, is_message, load_module_class
 
 HANGS_S = 30.0  # chosen: far longer than any round at work, and the command still waits then; machine seconds
@@ -54,6 +54,7 @@ class UnitExchanges:
         modules: Name → module; kept up to date.
         graph: The unit's graph at its start.
         unit: Returns the unit.
+        views: Returns the debug views for the class of a module that produces from now on.
         exchanged: Called after an exchange with the orders of all running modules, which become the component's
             parameters.
     """
@@ -64,10 +65,11 @@ class UnitExchanges:
         modules: dict[str, Module],
         graph: Graph,
         unit: Callable[[], ExecutionUnit],
+        views: Callable[[str], Debug],
         exchanged: Callable[[list[ModuleOrder]], None],
     ) -> None:
         self._component, self._modules, self._graph, self._unit = component, modules, graph, unit
-        self._exchanged = exchanged
+        self._views, self._exchanged = views, exchanged
         self._kinds: dict[str, object] = {}
         """Key → class of the values; those at the start, because a file that is imported again declares new classes."""
         for one in component.parameters.modules:
@@ -157,7 +159,7 @@ class UnitExchanges:
         return judge_of_sent(self._component.address, most_bytes, kinds, member)
 
     async def _until_over(self, candidate: _Candidate, exchange: Exchange, changed: asyncio.Event) -> None:
-        clock, views, loop = self._component.clock, candidate.old.debug, asyncio.get_running_loop()
+        clock, loop = self._component.clock, asyncio.get_running_loop()
         overdue_s = 0.0
         while not exchange.is_over:
             left_s, looked_s = max(LEAST_WAIT_S, (exchange.due_s - clock.now_s()) / clock.rate), loop.time()
@@ -170,10 +172,17 @@ class UnitExchanges:
             changed.clear()
             overdue_s = 0.0
             if exchange.phase is ExchangePhase.PROVING:
-                candidate.new.debug, candidate.old.debug = views, UNSEEN
+                self._let_show(candidate.new, candidate)
                 self._tell(candidate.asked, f"{candidate.order.class_path} produces, and has to prove itself")
-        is_new = exchange.phase is ExchangePhase.PROVED
-        candidate.new.debug, candidate.old.debug = (views, UNSEEN) if is_new else (UNSEEN, views)
+        self._let_show(candidate.new if exchange.phase is ExchangePhase.PROVED else candidate.old, candidate)
+
+    def _let_show(self, one: Module, candidate: _Candidate) -> None:
+        """Give the debug views to this one of the two."""
+        for other in (candidate.old, candidate.new):
+            if other is not one:
+                other.debug = UNSEEN
+        if one.debug is UNSEEN:
+            one.debug = self._views(candidate.asked.module)
 
     def _end_unit(self, candidate: _Candidate) -> NoReturn:
         """End the unit, because a round hangs in its thread: no heartbeat is missing, so its creator sees nothing.

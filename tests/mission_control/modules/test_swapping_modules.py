@@ -28,6 +28,7 @@ from backbone.component.messages import (
     Story,
     WrongParameter,
 )
+from backbone.debug_views import ListViews, ViewKind, Views
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
@@ -168,6 +169,25 @@ Play = Callable[[Callable[[], Awaitable[None]]], None]
 @pytest.fixture
 def play(stage: Stage, local_mission: Any, beside: Any) -> Play:
     return lambda scene: run_virtual(stage.play(local_mission, beside, scene))
+
+
+@pytest.mark.parametrize("prove_s", [0.0, 1.0])
+def test_a_new_class_may_show_otherwise_what_the_old_one_showed(stage: Stage, play: Play, prove_s: float) -> None:
+    async def scene() -> None:
+        count = "self.state.number += self.parameters.step"
+        views = []
+        for shows in ("value('count', 1); self.debug.value('other', 2)", "picture('count', lambda: None)"):
+            stage.edit(count, f"{count}; self.debug.{shows}")
+            assert (await stage.swap(prove_s=prove_s)).cause == ""
+            await VirtualClock().sleep_s(0.5)
+            listed = await stage.bus.ask(UNIT, ListViews(), Views, within_s=1.0)
+            views.append([(one.view, one.kind, one.value) for one in listed.views])
+        assert views == [
+            [("counter-count", ViewKind.VALUE, 1.0), ("counter-other", ViewKind.VALUE, 2.0)],
+            [("counter-count", ViewKind.PICTURE, "")],
+        ]
+
+    play(scene)
 
 
 def test_an_edited_file_is_the_new_code_and_goes_on_with_the_state(stage: Stage, play: Play) -> None:
