@@ -144,7 +144,7 @@ def launcher(up: subprocess.Popen[str], mark: str) -> psutil.Process:
 
 def test_a_mission_that_nobody_can_find_any_more_ends() -> None:
     with mission_up(mission_xml=SMALLEST) as mission:
-        shutil.rmtree(mission.directory)
+        shutil.rmtree(mission.directory.rename(mission.directory.with_name("removed")))  # services write files there
         assert mission.launcher.wait(20) == 6, mission.story()
         mission.wait_for_line("the mission failed: .*was removed", 15.0)
         assert wait_gone(mission.environment[MARK], 3.0) == []
