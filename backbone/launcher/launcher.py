@@ -346,8 +346,9 @@ class Launcher(Component[NoParameters]):
         await asyncio.gather(*(self._stop(c.name) for c in description.components))
 
     async def _stop_roots(self) -> None:
-        for order in reversed(behavior_orders(self._tree.description)):
-            await self._stop(order.name)
+        """Stop all roots at once, so that a root on a host that is cut off delays no other root."""
+        roots = reversed(behavior_orders(self._tree.description))
+        await asyncio.gather(*(self._stop(order.name) for order in roots))
 
     async def _stop_placed(self, is_meant: Callable[[Placement], bool]) -> None:
         with contextlib.suppress(LinkError, Refusal):  # without a placer the creators end the rest

@@ -1,0 +1,102 @@
+"""The end of a mission orders the end of all roots at once, so a root that does not confirm it delays no other root."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, cast
+
+from backbone.addresses import PLACER
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.component.launch import Launch
+from backbone.creator.messages import EndedBy, ProcessEnded
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.launcher.core_launches import UpOptions
+from backbone.launcher.launcher import Launcher
+from backbone.mission.reader import read_mission_bytes
+from backbone.naming import Subsystem
+from backbone.placer.messages import Ended, ListPlacements, Placements, Start, Started, StopComponent
+from backbone.wire import Envelope, Message
+
+ROOTS = ["one", "two", "three"]
+WAIT = '<behavior type="wait" name="{}" priority="1"><parameter name="seconds" value="9"/></behavior>'
+BEHAVIORS = "".join(map(WAIT.format, ROOTS))
+MISSION_XML = f'<mission name="m" priority="1"><behaviors>{BEHAVIORS}</behaviors></mission>'
+MISSION = read_mission_bytes(MISSION_XML.encode(), "m.xml")
+HERE = MISSION.hosts[0].name
+LAUNCHER = Launch("local", Subsystem.BACKBONE, "launcher", "launcher", "", HERE, "", 0.0, 1.0)
+CUT_OFF_S = 7.0
+
+
+class KeeperWithoutProcesses:
+    """Core services that begin and end at once."""
+
+    on_fell = on_silent = on_changed = on_bug = None
+
+    async def start(self, launch: Launch, *_given: object) -> None: ...
+
+    async def end(self, name: str, _reason: str) -> ProcessEnded:
+        return ProcessEnded(name, EndedBy.ASKING, 0)
+
+    def absences(self) -> list[object]:
+        return []
+
+    def processes(self) -> list[object]:
+        return []
+
+
+class Watcher:
+    """Observer of a mission that ends as soon as it is up."""
+
+    def __init__(self) -> None:
+        self.is_up = asyncio.Event()
+
+    async def up(self, *_given: object) -> None:
+        self.is_up.set()
+        await asyncio.Event().wait()
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *_arguments: None
+
+
+def test_a_root_on_a_host_that_is_cut_off_delays_the_end_of_no_other_root(local_mission: Callable[..., Any]) -> None:
+    async def main() -> None:
+        async with local_mission() as network:
+            clock, ordered_s = VirtualClock(), dict[str, float]()
+
+            async def placer(asked: Envelope[Message]) -> Message:
+                match asked.body:
+                    case Start(name=name):
+                        return Started(f"mission_control/{name}", HERE, 1, [])
+                    case StopComponent(name=name):
+                        ordered_s[name] = clock.now_s()
+                        if name == ROOTS[-1]:
+                            await clock.sleep_s(CUT_OFF_S)
+                        return Ended(name, EndedBy.ASKING)
+                    case ListPlacements():
+                        return Placements([])
+                raise AssertionError(asked)
+
+            bus = network.join(PLACER, clock)
+            bus.serve(PLACER, Start | StopComponent | ListPlacements, placer)
+            bus.declare_alive(PLACER)
+            watcher, keeper = Watcher(), cast("ProcessKeeper", KeeperWithoutProcesses())
+            launcher = Launcher(
+                LAUNCHER,
+                network.join(LAUNCHER.address, clock),
+                clock,
+                keeper=keeper,
+                description=MISSION,
+                options=UpOptions(),
+                observer=watcher,
+                began_s=0.0,
+            )
+            running = asyncio.create_task(launcher.run())
+            await watcher.is_up.wait()
+            began_s = clock.now_s()
+            launcher.end("test", at_once=True)
+            await running
+            assert [ordered_s[name] - began_s for name in ROOTS] == [0.0, 0.0, 0.0]
+            assert clock.now_s() - began_s >= CUT_OFF_S, "the end is only complete when the last root has ended"
+
+    run_virtual(main())
