@@ -23,7 +23,7 @@ from backbone.keys import Conversation
 from backbone.launcher.bring_up import run_mission
 from backbone.launcher.core_launches import UpOptions
 from backbone.launcher.endings import ExitCode, complaint_of
-from backbone.launcher.outcome import Outcome
+from backbone.launcher.outcome import Outcome, with_signals
 from backbone.launcher.verdict import VerdictPipe
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.operators import OperatorActed
@@ -258,7 +258,7 @@ def last_lines(outcome: Outcome) -> list[str]:
     if outcome.ready_after_s is not None:
         lines.append(f"was ready after {outcome.ready_after_s:.2f} s")
     if outcome.pushed:
-        lines.append("needed a signal to end: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
+        lines.append(with_signals(outcome.pushed))
     if outcome.failure is not None:
         return [*lines, f"the mission failed: {outcome.why_failed}"]
     return [*lines, f"down: {counted(len(outcome.ended), 'component')} ended, nothing is left"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
 import subprocess
@@ -16,11 +17,12 @@ from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.errors import LinkError, Refusal
+from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.launcher.bring_up import end_mission
 from backbone.launcher.core_launches import UpOptions
-from backbone.launcher.ending_messages import AwaitLastBranch, LastBranchOver
+from backbone.launcher.ending_messages import AwaitEnd, AwaitLastBranch, LastBranchOver, MissionEnded
 from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.outcome import with_signals
 from backbone.launcher.verdict import await_verdict
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.waiting import first_of, set_within
@@ -112,13 +114,13 @@ async def _end_launcher(found: run_files.RunFile, *, at_once: bool) -> int:
             ("SIGTERM", TERM_S, signal.SIGTERM),  # the second one ends a last branch
             ("SIGKILL", KILL_S, signal.SIGKILL),
         ):
-            if act is None:
-                if not await _ask(found, ended, at_once=at_once):
-                    continue
-            else:
+            needed = f"{what} was enough"
+            if act is not None:
                 launcher.send_signal(act)
+            elif not (needed := await _ask(found, ended, at_once=at_once)):
+                continue
             if await set_within(ended, seconds):
-                say(f"mission {found.mission} is down; {what} was enough")
+                say(f"mission {found.mission} is down; {needed}")
                 return ExitCode.DONE if what != "SIGKILL" else ExitCode.MISSION_FAILED
     finally:
         loop.remove_reader(waiting)
@@ -127,8 +129,12 @@ async def _end_launcher(found: run_files.RunFile, *, at_once: bool) -> int:
     return ExitCode.MISSION_FAILED
 
 
-async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool) -> bool:
-    """Order the mission to end and wait for its last branch; return whether the launcher accepted the order."""
+async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool) -> str:
+    """Order the mission to end, and wait for its last branch and its end.
+
+    Returns:
+        What was needed to end its components, for people; empty: the launcher does not end the mission.
+    """
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     try:
         bus = await ZenohBus.open_when_up(
@@ -139,7 +145,7 @@ async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool)
         )
     except LinkError as error:
         say(f"the hub cannot be reached: {error}")
-        return False
+        return ""
     try:
         publish_action(bus, clock, OperatorAction.STOP_MISSION, found.mission, "by command")
         ending = await end_mission(bus, at_once=at_once)
@@ -147,15 +153,29 @@ async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool)
             say(ending.told)
         if ending.within_s:
             await first_of(_tell_last_branch(bus, ending.within_s / clock.rate + ASKED_S), ended.wait())
+        return await _needed(bus, ended)
     except LinkError as error:
         say(f"the launcher does not answer: {error}")
-        return False
+        return ""
     except Refusal as error:  # it is of another release
         say(f"the launcher does not take the order: {error}")
-        return False
+        return ""
     finally:
         await bus.close()
-    return True
+
+
+async def _needed(bus: Bus, ended: asyncio.Event) -> str:
+    """Return what was needed to end the components, for people.
+
+    Raises:
+        ReplyTimeout: They have not ended within ``ASKED_S``.
+    """
+    asking = asyncio.create_task(bus.ask(LAUNCHER, AwaitEnd(), MissionEnded, within_s=ASKED_S))
+    await first_of(asking, ended.wait())
+    if not asking.cancelled():
+        with contextlib.suppress(NoResponder, Refusal):  # it died, or it is of another release
+            return with_signals(asking.result().signaled) or "asking was enough"
+    return "it is unknown whether its components needed a signal"
 
 
 async def _tell_last_branch(bus: Bus, within_s: float) -> None:

@@ -1,8 +1,11 @@
-"""Messages of the launcher: the order to end the mission, and how its last branch went."""
+"""Messages of the launcher: the order to end the mission, how its last branch went, and what a signal ended."""
 
 from __future__ import annotations
 
-from backbone.ranges import Duration, Text
+from typing import Annotated
+
+from backbone.creator.messages import ProcessEnded
+from backbone.ranges import MANY, Duration, Text
 from backbone.wire import Message
 
 
@@ -40,3 +43,20 @@ class LastBranchOver(Message, frozen=True):
     """
 
     told: Text = ""
+
+
+class AwaitEnd(Message, frozen=True):
+    """Ask which components a signal ended. The launcher answers when all but the first core services have ended."""
+
+
+class MissionEnded(Message, frozen=True):
+    """Answer to ``AwaitEnd``: all but the nameserver and the component database have ended.
+
+    Attributes:
+        signaled: Components that a signal ended, because they were starting or did not answer.
+    """
+
+    signaled: Annotated[list[ProcessEnded], MANY]
+
+
+EndingQuestion = EndMission | AwaitLastBranch | AwaitEnd

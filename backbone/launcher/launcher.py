@@ -29,9 +29,18 @@ from backbone.creator.messages import (
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.awaited_hosts import announce_awaited_hosts, awaited_hosts
+from backbone.launcher.consoles_end import stop_consoles
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.declared_orders import hardware_orders, unit_orders
-from backbone.launcher.ending_messages import AwaitLastBranch, EndMission, LastBranchOver, MissionEnding
+from backbone.launcher.ending_messages import (
+    AwaitEnd,
+    AwaitLastBranch,
+    EndingQuestion,
+    EndMission,
+    LastBranchOver,
+    MissionEnded,
+    MissionEnding,
+)
 from backbone.launcher.folder_watch import wait_removed
 from backbone.launcher.hand_recorders import HandRecorderWatch
 from backbone.launcher.health_watch import HealthWatch
@@ -48,7 +57,6 @@ from backbone.mission.behavior_orders import behavior_orders, last_order
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_log.operators import OperatorAction, publish_action
-from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
 from backbone.run_files import RunFolderRemoved
@@ -66,7 +74,7 @@ class Launcher(Component[NoParameters]):
 
     drains_within_s = None
     accepts: ClassVar[Accepts | None] = (
-        ListProcesses | AskLog | AskPeople | AskDeclared | AskTree | TreeChange | EndMission | AwaitLastBranch
+        ListProcesses | AskLog | AskPeople | AskDeclared | AskTree | TreeChange | EndingQuestion
     )
 
     def __init__(
@@ -104,7 +112,7 @@ class Launcher(Component[NoParameters]):
         self.outcome = Outcome()
         self._others_changed = asyncio.Event()
         self._last = LastBranch(description.last)
-        self._last_begins, self._last_is_over = asyncio.Event(), asyncio.Event()
+        self._last_begins, self._last_is_over, self._has_ended = asyncio.Event(), asyncio.Event(), asyncio.Event()
         keeper.on_fell = self._core_service_fell
         keeper.on_silent = self._core_service_silent
         keeper.on_changed = self.changed
@@ -214,6 +222,9 @@ class Launcher(Component[NoParameters]):
             case AwaitLastBranch():
                 await self._last_is_over.wait()
                 return LastBranchOver(self._last.told)
+            case AwaitEnd():
+                await self._has_ended.wait()
+                return MissionEnded(self.outcome.pushed)
         return await super().answer(asked)
 
     def _declared(self, name: str) -> Start | None:
@@ -251,7 +262,7 @@ class Launcher(Component[NoParameters]):
             self._observer.announce(self._last.told)
             self.publish_event(self._last.name, self._last.how, LogLevel.NOTICE)
         async with self._step("stop consoles"):
-            await self._stop_consoles()
+            await stop_consoles(self.bus)
         async with self._step("stop mission"):
             say = announce_awaited_hosts(self._others, self.clock, self._others_changed, self._observer.announce)
             saying = asyncio.create_task(say, name="say what is awaited")
@@ -263,8 +274,11 @@ class Launcher(Component[NoParameters]):
             async with self._step("stop creators of other hosts"):
                 await self._stop_other_hosts()
         async with self._step("stop core services"):
-            for launch in reversed(core_launches(self._description, self.launch, self._options)):
-                self.outcome.ended.append(await self._keeper.end(launch.name, "the mission ends"))
+            first, *others = (one.name for one in core_launches(self._description, self.launch, self._options))
+            for name in reversed(others):
+                self.outcome.ended.append(await self._keeper.end(name, "the mission ends"))
+            self._has_ended.set()  # the bus still sends the answers while the first one ends
+            self.outcome.ended.append(await self._keeper.end(first, "the mission ends"))
 
     def _backbone_changed(self, address: str, stands: bool) -> None:
         if self._others.token_changed(address, stands, self.clock.now_s()):
@@ -310,7 +324,7 @@ class Launcher(Component[NoParameters]):
         assert order is not None  # noqa: S101  the decision is to run it
         behaviors = ends_before(self._description.types)
         async with self._step("stop consoles"):
-            await self._stop_consoles()
+            await stop_consoles(self.bus)
         async with self._step("stop behaviors"):
             await self._stop_roots()
             await self._stop_placed(lambda placed: placed.type in behaviors)
@@ -321,18 +335,6 @@ class Launcher(Component[NoParameters]):
         at = address(Subsystem.MISSION_CONTROL, order.name)
         await run_last(self._last, self.bus, self.clock, at, self._wishes.keep_once(order, at), until_s)
         self.end(reason)
-
-    async def _stop_consoles(self) -> None:
-        """Ask every console to stop; each console releases its robot."""
-        with contextlib.suppress(LinkError):  # without a nameserver no console can be reached
-            listing = await self.bus.ask(
-                NAMESERVER, ListComponents(subsystem=Subsystem.UI_CONSOLE), Components, within_s=LISTING_TIME_S
-            )
-            stops = (
-                self.bus.ask(console.address, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
-                for console in listing.components
-            )
-            await asyncio.gather(*stops, return_exceptions=True)
 
     async def _stop_mission(self) -> None:
         """Stop behaviors first (each stops its children), then the remaining ARCs, then hardware."""

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from backbone.bus.interface import Bus, Clock
 from backbone.creator.messages import EndedBy, ProcessEnded, StartFailed
+
+
+def with_signals(ended: Sequence[ProcessEnded]) -> str:
+    """Return the components with the signals that ended them, for people; empty: none.
+
+    Example:
+        >>> with_signals([ProcessEnded("spin", EndedBy.SIGKILL, 0)])
+        'needed a signal to end: spin (sigkill)'
+    """
+    return f"needed a signal to end: {', '.join(f'{end.name} ({end.by})' for end in ended)}" if ended else ""
 
 
 @dataclass

@@ -12,6 +12,7 @@ from backbone.component.launch import Launch
 from backbone.creator.messages import EndedBy, ProcessEnded
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.launcher.core_launches import UpOptions
+from backbone.launcher.ending_messages import AwaitEnd, MissionEnded
 from backbone.launcher.launcher import Launcher
 from backbone.mission.reader import read_mission_bytes
 from backbone.naming import Subsystem
@@ -29,13 +30,17 @@ CUT_OFF_S = 7.0
 
 
 class KeeperWithoutProcesses:
-    """Core services that begin and end at once."""
+    """Core services that begin at once and end after a while."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock = clock
 
     on_fell = on_silent = on_changed = on_bug = None
 
     async def start(self, launch: Launch, *_given: object) -> None: ...
 
     async def end(self, name: str, _reason: str) -> ProcessEnded:
+        await self._clock.sleep_s(0.1)
         return ProcessEnded(name, EndedBy.ASKING, 0)
 
     def absences(self) -> list[object]:
@@ -59,7 +64,9 @@ class Watcher:
         return lambda *_arguments: None
 
 
-def test_a_root_on_a_host_that_is_cut_off_delays_the_end_of_no_other_root(local_mission: Callable[..., Any]) -> None:
+def test_a_root_that_is_cut_off_delays_no_other_and_the_killed_one_is_named(
+    local_mission: Callable[..., Any],
+) -> None:
     async def main() -> None:
         async with local_mission() as network:
             clock, ordered_s = VirtualClock(), dict[str, float]()
@@ -72,7 +79,7 @@ def test_a_root_on_a_host_that_is_cut_off_delays_the_end_of_no_other_root(local_
                         ordered_s[name] = clock.now_s()
                         if name == ROOTS[-1]:
                             await clock.sleep_s(CUT_OFF_S)
-                        return Ended(name, EndedBy.ASKING)
+                        return Ended(name, EndedBy.SIGKILL if name == ROOTS[0] else EndedBy.ASKING)
                     case ListPlacements():
                         return Placements([])
                 raise AssertionError(asked)
@@ -80,7 +87,8 @@ def test_a_root_on_a_host_that_is_cut_off_delays_the_end_of_no_other_root(local_
             bus = network.join(PLACER, clock)
             bus.serve(PLACER, Start | StopComponent | ListPlacements, placer)
             bus.declare_alive(PLACER)
-            watcher, keeper = Watcher(), cast("ProcessKeeper", KeeperWithoutProcesses())
+            asker = network.join("ui_console/down", clock)
+            watcher, keeper = Watcher(), cast("ProcessKeeper", KeeperWithoutProcesses(clock))
             launcher = Launcher(
                 LAUNCHER,
                 network.join(LAUNCHER.address, clock),
@@ -95,8 +103,10 @@ def test_a_root_on_a_host_that_is_cut_off_delays_the_end_of_no_other_root(local_
             await watcher.is_up.wait()
             began_s = clock.now_s()
             launcher.end("test", at_once=True)
+            ended = await asker.ask(LAUNCHER.address, AwaitEnd(), MissionEnded, within_s=60.0)
             await running
             assert [ordered_s[name] - began_s for name in ROOTS] == [0.0, 0.0, 0.0]
             assert clock.now_s() - began_s >= CUT_OFF_S, "the end is only complete when the last root has ended"
+            assert ended.signaled == [ProcessEnded(ROOTS[0], EndedBy.SIGKILL, 0)]
 
     run_virtual(main())

@@ -10,10 +10,12 @@ from typing import Any
 import pytest
 
 from backbone import run_files
-from backbone.errors import HubUnreachable
+from backbone.creator.messages import EndedBy, ProcessEnded
+from backbone.errors import HubUnreachable, NoResponder
 from backbone.launcher import detached
+from backbone.launcher.ending_messages import EndMission, MissionEnded, MissionEnding
 from backbone.run_files import RunFile
-from backbone.wire import WrongVersion
+from backbone.wire import Message, WrongVersion
 
 pytestmark = pytest.mark.processes
 
@@ -73,3 +75,46 @@ def test_a_launcher_of_another_release_is_ended_by_a_signal(
     assert "does not take the order" in told
     assert "bring the mission up anew" in told
     assert "mission m is down; SIGTERM was enough" in told
+
+
+KILLED = ProcessEnded("spin", EndedBy.SIGKILL, 0)
+ACCOUNTS = [
+    (MissionEnded([]), "asking was enough"),
+    (MissionEnded([KILLED]), "needed a signal to end: spin (sigkill)"),
+    (NoResponder("it fell"), "it is unknown whether its components needed a signal"),
+]
+
+
+@pytest.mark.parametrize(("account", "words"), ACCOUNTS)
+def test_the_last_line_says_what_the_components_needed(
+    account: MissionEnded | NoResponder,
+    words: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with subprocess.Popen(["sleep", "60"]) as launcher:
+
+        class Ending:
+            source = "ui_console/down-1"
+
+            @classmethod
+            async def open_when_up(cls, *_given: Any) -> Ending:
+                return cls()
+
+            def publish(self, *_given: Any) -> None: ...
+
+            async def ask(self, _address: str, question: Message, *_given: Any, **_by_name: Any) -> Message:
+                if isinstance(question, EndMission):
+                    return MissionEnding()
+                launcher.terminate()
+                if isinstance(account, NoResponder):
+                    raise account
+                return account
+
+            async def close(self) -> None: ...
+
+        found = RunFile("m", "unixsock-stream/nowhere", launcher.pid, 0.0, 1.0, "base", "m.xml")
+        monkeypatch.setattr(detached, "ZenohBus", Ending)
+        monkeypatch.setattr(run_files, "find", lambda _mission: found)
+        assert asyncio.run(detached.take_down("m")) == 0
+    assert capsys.readouterr().err == f"mission m is down; {words}\n"
