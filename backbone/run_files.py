@@ -78,6 +78,13 @@ class RunFolderUnusable(Refusal):
     remedy = "Free the disk, or set XDG_RUNTIME_DIR to a folder of your own that can be written into."
 
 
+class RunFolderRelative(Refusal):
+    """The folder of the run files would be another one in each working directory."""
+
+    code = "run.folder_relative"
+    remedy = "Set XDG_RUNTIME_DIR to an absolute path, or unset it."
+
+
 class RunFolderRemoved(Refusal):
     """The folder of a mission that is up was removed, as at the end of a login session."""
 
@@ -104,6 +111,7 @@ def run_directory(mission: str) -> Path:
 
     Raises:
         IllegalName: The mission's name is no legal name.
+        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
         UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused.
     """
@@ -117,6 +125,7 @@ def kept_directory() -> Path:
     sessions.
 
     Raises:
+        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
         UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused.
     """
@@ -137,6 +146,7 @@ def own_folder(mission: str) -> Iterator[Path]:
 
     Raises:
         FolderInUse: Another process has the folder.
+        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
         UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused; the folder is removed.
     """
@@ -153,6 +163,7 @@ def prepare(mission: str) -> Path:
     """Create the folder of a mission's files, check that it is writable, and return it.
 
     Raises:
+        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
         UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused; the folder is removed.
     """
@@ -191,6 +202,7 @@ def write(run_file: RunFile) -> Path:
     """Make the mission findable and return the file's path.
 
     Raises:
+        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
         UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused.
     """
@@ -245,6 +257,7 @@ def find_all() -> list[RunFile]:
     """Return the missions that are up on this machine, sorted by name; folders that cannot be read are left out.
 
     Raises:
+        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
         UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused to list the folders.
     """
@@ -283,6 +296,8 @@ def _remove_what_dead_zygotes_left(directory: Path) -> None:
 def _directory() -> Path:
     """Create and check the folder of this user's run files, and return it."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
+    if runtime and not os.path.isabs(runtime):
+        raise RunFolderRelative(f"XDG_RUNTIME_DIR is {runtime!r}, a relative path", directory=runtime)
     base = Path(runtime) if runtime else Path(tempfile.gettempdir()) / f"scout-backbone-{os.getuid()}"
     directory = base / "scout-backbone"
     try:

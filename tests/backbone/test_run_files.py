@@ -17,6 +17,7 @@ from backbone.run_files import (
     FolderInUse,
     MissionNotUp,
     RunFile,
+    RunFolderRelative,
     RunFolderUnusable,
     SeveralMissions,
     TraceUnwritable,
@@ -212,3 +213,17 @@ def test_a_mission_that_ends_leaves_its_successor_alone() -> None:
         with run_files.own_folder("iros2001"):
             ending.close()
             assert (folder / "log").is_dir()
+
+
+@pytest.mark.parametrize("relative", ["run", ".", "../run", "~/run"])
+def test_a_relative_runtime_folder_is_refused_by_each_command(
+    relative: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """XDG Base Directory Specification 0.8: paths must be absolute, a relative path is invalid."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", relative)
+    for access in (run_files.find, run_files.kept_directory, lambda: run_files.run_directory("m")):
+        with pytest.raises(RunFolderRelative, match=relative) as refused:
+            access()
+        assert "Set XDG_RUNTIME_DIR to an absolute path" in refused.value.remedy
+    assert not list(tmp_path.iterdir())
