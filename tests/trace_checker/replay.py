@@ -21,12 +21,28 @@ ROUNDING_S = 1e-6  # chosen: times are written to the microsecond
 
 
 def check(lines: Iterable[Line], tolerance_s: float | None = None) -> list[Violation]:
-    """Return all violations in the trace; the tolerance is the trace's own unless one is given."""
-    return Replay(tolerance_s).run(list(lines))
+    """Return all violations in the trace, life by life; the tolerance is the trace's own unless one is given."""
+    return [found for life in _lives(lines) for found in Replay(tolerance_s).run(life)]
+
+
+def _lives(lines: Iterable[Line]) -> list[list[Line]]:
+    """Return the lines of each life of the RC manager, which begins with ``meta`` and writes all that it found.
+
+    A ``meta`` that changes the work from ``plan`` to ``relaxed`` continues a life: a group became too large.
+    """
+    lives: list[list[Line]] = [[]]
+    work = ""
+    for line in lines:
+        if line.get("ev") == "meta":
+            if lives[-1] and (work, line.get("wc")) != ("plan", "relaxed"):
+                lives.append([])
+            work = line.get("wc")
+        lives[-1].append(line)
+    return lives
 
 
 class Replay:
-    """One trace, from its first line to its last."""
+    """One life of the RC manager, from its first line to its last."""
 
     def __init__(self, tolerance_s: float | None = None) -> None:
         self.found: list[Violation] = []

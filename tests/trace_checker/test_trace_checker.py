@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from trace_checker import Malformed, admissible, read_lines
+from trace_checker import Malformed, admissible, check, read_lines
 from trace_checker.__main__ import main
 from trace_checker.admission import Stream, stream_of
 from trace_checker.priority_order import NodeTree, connected, higher, ranked
-from trace_checker.test_each_violation import A, V, meta, starts
-from trace_checker.trace_format import require_sound
+from trace_checker.test_each_violation import A, B, V, line, meta, starts
+from trace_checker.trace_format import Line, require_sound
 
 
 @pytest.mark.parametrize(
@@ -95,3 +95,26 @@ def test_shares_that_add_up_to_the_capacity_fit() -> None:
     stream = stream_of({"period": 0.1, "cost": 0.01})
     assert admissible([stream] * 3, 0.3)
     assert not admissible([stream] * 4, 0.3)
+
+
+KILLED = [meta(), V, A, *starts(0, "a", v=1)]
+"""A life of an RC manager that was killed while ``a`` had its RC."""
+
+
+@pytest.mark.parametrize(
+    ("second", "found"),
+    [
+        ([B, *starts(3, "b", v=2), line("end", 4)], []),
+        ([B, *starts(3, "b", v=2), A, *starts(3.5, "a", v=3), line("end", 4)], ["EXCL"]),
+    ],
+)
+def test_each_life_of_the_rc_manager_is_judged_by_itself(second: list[Line], found: list[str]) -> None:
+    """Its successor collects requests and holders anew, and writes them down anew, behind a ``meta`` of its own."""
+    life = [{**one, "t": max(one["t"], 3.0)} for one in (meta(), V, *second)]
+    assert [one.code for one in check([*KILLED, *life])] == found
+
+
+def test_a_meta_that_only_relaxes_the_plan_begins_no_life() -> None:
+    relaxed = {**meta(), "t": 1.0, "wc": "relaxed"}
+    again = line("grant", 2, arc="a", epoch={"v": 2})
+    assert [one.code for one in check([*KILLED, relaxed, again])] == ["FORM"]

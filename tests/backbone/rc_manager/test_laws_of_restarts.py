@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rc_manager_at_work import Pool, request
-from trace_checker import check
+from trace_checker import check, read_lines
 
 from backbone.bus.clock import run_virtual
 from backbone.errors import LinkError, Refusal
@@ -45,8 +44,7 @@ def test_equals_take_turns_however_often_the_rc_manager_dies(
 
     trace, turns = run_virtual(main())
     assert max(turns.values()) - min(turns.values()) <= 1, turns
-    for life in _lives(trace):
-        assert check(life) == []
+    assert check(read_lines(trace)) == []
 
 
 async def _ask(here: Pool, arcs: Sequence[Any]) -> None:
@@ -66,9 +64,3 @@ async def _live_until(here: Pool, end_s: float) -> None:
     await here.clock.sleep_until_s(end_s)
     life.cancel()
     await asyncio.wait({life})
-
-
-def _lives(trace: Path) -> list[list[dict[str, Any]]]:
-    lines = [json.loads(line) for line in trace.read_text().splitlines()]
-    begins = [number for number, line in enumerate(lines) if line["ev"] == "meta"]
-    return [lines[begin:end] for begin, end in zip(begins, [*begins[1:], len(lines)], strict=True)]
