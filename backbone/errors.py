@@ -57,7 +57,8 @@ class Refusal(BackboneError):
             _classes_by_code[cls.code] = cls
 
     def __str__(self) -> str:
-        return f"{self.detail} ({self.remedy})"
+        first, end, others = self.detail.partition("\n")  # the others are the end of a log
+        return f"{first} ({self.remedy}){end}{others}"
 
 
 _classes_by_code: dict[str, type[Refusal]] = {}

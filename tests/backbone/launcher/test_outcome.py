@@ -16,6 +16,12 @@ from backbone.launcher.outcome import Outcome
         (StartFailed("no /dev/ttyUSB0", remedy="Plug it in.", name="radio2"), "radio2: no /dev/ttyUSB0 (Plug it in.)"),
         (StartFailed("radio2: killed", remedy="Mend it.", name="radio2"), "radio2: killed (Mend it.)"),
         (StartFailed("no host", remedy="Mend it."), "no host (Mend it.)"),
+        (
+            StartFailed(
+                "bad1: exit code 1: Broken: no map (bad.py, line 26)\n  File …", remedy="Mend it.", name="bad1"
+            ),
+            "bad1: exit code 1: Broken: no map (bad.py, line 26) (Mend it.)\n  File …",
+        ),
         (BackboneError("the hub hangs"), "the hub hangs"),
     ],
 )
