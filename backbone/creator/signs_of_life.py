@@ -49,7 +49,7 @@ class SignsOfLife:
                 silence, beats = self._silences.setdefault(pid, Silence()), vitals.beats > 0
                 before_s = silence.silent_s
                 silent_s = silence.look(vitals, now_s)
-                yield Sign(pid, silent_s, beats, beats and before_s < STACKS_AFTER_S <= silent_s)
+                yield Sign(pid, silent_s, beats, before_s < STACKS_AFTER_S <= silent_s)
 
     def doing(self, pid: int) -> str:
         """Return the present work of the process; empty if it is unknown."""

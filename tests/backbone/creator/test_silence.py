@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hypothesis.strategies as st
+import pytest
 from hypothesis import given
 
 from backbone.component.heartbeat import Vitals
+from backbone.creator.signs_of_life import STACKS_AFTER_S, SignsOfLife
 from backbone.creator.silence import LOOK_EVERY_S, LOOK_MOST_S, Silence
 
 GAPS_S = st.lists(st.floats(0.01, 30.0), min_size=1, max_size=40)
@@ -61,3 +63,11 @@ def test_a_process_that_imports_before_its_first_beat_shows_life() -> None:
 
 def test_a_supervisor_that_was_paused_calls_nobody_dead() -> None:
     assert play([(0.0, Vitals(7)), (60.0, Vitals(7)), (60.25, Vitals(8))]) == [0.0, LOOK_MOST_S, 0.0]
+
+
+def test_stacks_are_due_once_in_a_silence_also_before_the_first_beat() -> None:
+    """A constructor that waits for ever never beats; its place in the code is the only hint at the bug."""
+    signs = SignsOfLife(lambda _directory, _pid: Vitals(0, doing="starts"))
+    hangs = [sign.hangs for tick in range(40) for sign in signs.look("", [7], tick * LOOK_EVERY_S)]
+    assert hangs.count(True) == 1
+    assert hangs.index(True) == pytest.approx(STACKS_AFTER_S / LOOK_EVERY_S, abs=1.0)
