@@ -135,6 +135,9 @@ class Bus(Protocol):
     def dropped(self) -> dict[str, int]:
         """Return the number of messages that came for listeners of this bus and were not handed to them.
 
+        Not counted: messages that a sender's queue dropped, and those sent while the link was down, see ``watch_link``.
+        Their number is unknown: a sender numbers all its messages, and a listener gets only those of its keys.
+
         The keys are the subscribed keys, without ``scout/<mission>/``; keys without a loss are left out.
         """
 

@@ -123,7 +123,7 @@ async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
         traffic.add(key, message.source, message.schema, message.size_bytes)
 
     async with connected(where) as (bus, clock), overhearing(bus, clock, wanted.keys, heard) as subscribed:
-        async with until_ended(bus, clock, wanted.for_s) as ended:
+        async with until_ended(bus, clock, wanted.for_s) as ended, naming_absences(bus, clock):
             printer = LinePrinter(ended.set)
             while not ended.is_set():
                 traffic.rows.clear()

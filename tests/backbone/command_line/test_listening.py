@@ -180,15 +180,23 @@ def test_output_that_no_reader_takes_is_no_success(
     assert capfd.readouterr().out == ""
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda: watching.watch(ANY, Watched((), for_s=30.0)),
+        lambda: watching.top(ANY, Watched((), for_s=30.0), once=False),
+    ],
+    ids=["watch", "top"],
+)
 def test_who_watches_is_told_of_an_absence_of_the_hub(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    command: Callable[[], Awaitable[ExitCode]], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     @asynccontextmanager
     async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
         yield LinkedBus([(0.0, UP), (20.0, DOWN), (21.5, UP)]), VirtualClock()
 
     monkeypatch.setattr(watching, "connected", connected)
-    run_virtual(watching.watch(ANY, Watched((), for_s=30.0)))
+    run_virtual(command())
     told = "incomplete: the hub was away for 1.5 s; an unknown number of messages is missing"
     assert told in capfd.readouterr().err.splitlines()
 
