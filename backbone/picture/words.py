@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
 from backbone.component.messages import Absence, StandingStop
@@ -10,6 +11,7 @@ from backbone.scheduling.views import RequestView
 from backbone.spoken import counted
 
 NAMES_SHOWN = 8  # chosen: they fit a line of a terminal
+_SECONDS = re.compile(r"\b\d+(?:\.\d+)?(?= s\b)")
 
 WANTED = "self"
 """The reason for a robot that the console itself gave back."""
@@ -78,15 +80,30 @@ def absence_line(absence: Absence, now_s: float) -> str:
 
 
 def absence_lines(absences: Iterable[Absence], now_s: float) -> list[str]:
-    """Return a line for each absence, or one for all that differ in nothing but their names, if these are many."""
-    alike: dict[str, list[str]] = {}
+    """Return a line for each absence, or one for all that differ in nothing but names and times, if these are many."""
+    alike: dict[str, list[Absence]] = {}
     for absence in absences:
-        alike.setdefault(_trouble(absence, now_s), []).append(absence.name)
+        alike.setdefault(_SECONDS.sub("", _trouble(absence, now_s)), []).append(absence)
     lines = []
-    for trouble, names in alike.items():
-        subjects = names if len(names) <= NAMES_SHOWN else [f"each of {counted_names(names)}"]
-        lines += [f"{subject} {trouble}" for subject in subjects]
+    for same in alike.values():
+        if len(same) <= NAMES_SHOWN:
+            lines += [absence_line(absence, now_s) for absence in same]
+        else:
+            names = counted_names([absence.name for absence in same])
+            lines.append(f"each of {names} {_with_ranges([_trouble(absence, now_s) for absence in same])}")
     return lines
+
+
+def _with_ranges(texts: Sequence[str]) -> str:
+    """Return a text for all, which differ only in their seconds.
+
+    Example:
+        >>> _with_ranges(["absent for 2.5 s, of 4 s", "absent for 1.5 s, of 4 s"])
+        'absent for 1.5 to 2.5 s, of 4 s'
+    """
+    columns = zip(*(_SECONDS.findall(text) for text in texts), strict=True)
+    ranges = (" to ".join(dict.fromkeys([min(column, key=float), max(column, key=float)])) for column in columns)
+    return _SECONDS.sub(lambda _found: next(ranges), texts[0])
 
 
 def _trouble(absence: Absence, now_s: float) -> str:
