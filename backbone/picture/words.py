@@ -80,18 +80,23 @@ def absence_line(absence: Absence, now_s: float) -> str:
 
 
 def absence_lines(absences: Iterable[Absence], now_s: float) -> list[str]:
-    """Return a line for each absence, or one for all that differ in nothing but names and times, if these are many."""
+    """Return a line for each absence, or one for all that differ only in own names and times, if these are many."""
     alike: dict[str, list[Absence]] = {}
     for absence in absences:
-        alike.setdefault(_SECONDS.sub("", _trouble(absence, now_s)), []).append(absence)
+        alike.setdefault(_SECONDS.sub("", _nameless(absence, now_s)), []).append(absence)
     lines = []
     for same in alike.values():
         if len(same) <= NAMES_SHOWN:
             lines += [absence_line(absence, now_s) for absence in same]
         else:
             names = counted_names([absence.name for absence in same])
-            lines.append(f"each of {names} {_with_ranges([_trouble(absence, now_s) for absence in same])}")
+            lines.append(f"each of {names} {_with_ranges([_nameless(absence, now_s) for absence in same])}")
     return lines
+
+
+def _nameless(absence: Absence, now_s: float) -> str:
+    """Return the trouble with ``NAME`` in place of the component's own name."""
+    return re.sub(rf"(?<![\w.-]){re.escape(absence.name)}(?![\w.-])", "NAME", _trouble(absence, now_s))
 
 
 def _with_ranges(texts: Sequence[str]) -> str:

@@ -133,12 +133,15 @@ def test_many_absences_for_the_same_reason_are_one_line() -> None:
 
 def test_many_absences_that_differ_only_in_times_are_one_line() -> None:
     """Twenty radios that fail one after the other filled the screen, and hid what else was wrong."""
-    radios = [Absence(f"radio{n}", n / 10, "it is mute", f"starts again in {n % 3}.5 s") for n in range(1, 21)]
+    radios = [
+        Absence(f"radio{n}", n / 10, f"resource_pool/radio{n} is mute", f"starts again in {n % 3}.5 s")
+        for n in range(1, 21)
+    ]
     other = Absence("scout1", 2.0, "it is mute", "is being placed again")
     lines = MissionHealth(HealthWord.DEGRADED, [*radios, other]).lines(7.5)
     assert lines == [
         "each of 20 components (radio1, radio2, radio3, radio4, radio5, radio6, radio7, radio8 and 12 more) "
-        "is absent for 5.5 to 7.4 s: it is mute; starts again in 0.5 to 2.5 s",
+        "is absent for 5.5 to 7.4 s: resource_pool/NAME is mute; starts again in 0.5 to 2.5 s",
         "scout1 is absent for 5.5 s: it is mute; is being placed again",
     ]
 
