@@ -50,6 +50,7 @@ async def page_at(stage: Stage, size: str = "desktop", **options: Any) -> AsyncI
         stage.place_robots("scout1", "scout2", "scout3")
     stage.grant_all()
     options.setdefault("address", stage.address)
+    options.setdefault("may_be_kept", True)
     async with web_browser.page_at(size, shows=".robot[data-robot=scout1]", **options) as page:
         yield page
 
