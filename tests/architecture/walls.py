@@ -108,11 +108,15 @@ def _breaking(contract: dict[str, Any], edges: set[Import]) -> Iterator[Import]:
 
 
 def _against_layers(contract: dict[str, Any], importer: str, imported: str) -> bool:
-    layer = {
-        package: number for number, line in enumerate(contract["layers"]) for package in re.split(r"\s*[|:]\s*", line)
-    }
+    layer = _layers(tuple(contract["layers"]))
     above, below = (next((room for room in layer if _within(module, [room])), "") for module in (importer, imported))
     return above != below and above in layer and below in layer and layer[above] >= layer[below]
+
+
+@cache
+def _layers(lines: tuple[str, ...]) -> dict[str, int]:
+    """Return the number of each package's layer, the highest first."""
+    return {package: number for number, line in enumerate(lines) for package in re.split(r"\s*[|:]\s*", line)}
 
 
 def _forbidden(contract: dict[str, Any], importer: str, imported: str) -> bool:
