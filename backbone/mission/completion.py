@@ -21,13 +21,8 @@ def complete(root: Element) -> None:
         hosts.children.append(_element(root, "host", THIS_HOST))
     _complete_core(root, core, [host.text("name") for host in hosts.children])
     declared = {one.text("name") for one in types.children}
-    for shipped in shipped_types():
-        if shipped.text("name") not in declared:
-            for element in shipped:
-                element.place = root.place
-                for attribute in element.attributes.values():
-                    attribute.place = root.place
-            types.children.append(shipped)
+    shipped = [one.placed(root.place) for one in shipped_types() if one.text("name") not in declared]
+    types.children.extend(shipped)
 
 
 def _complete_core(root: Element, core: Element, hosts: list[str]) -> None:

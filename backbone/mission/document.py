@@ -106,6 +106,12 @@ class Element:
         for child in self.children:
             yield from child
 
+    def placed(self, place: Place) -> Element:
+        """Return a copy of this element and all its descendants, with all of it at this place."""
+        attributes = {name: Attribute(one.value, place, one.is_written) for name, one in self.attributes.items()}
+        children = [child.placed(place) for child in self.children]
+        return Element(self.tag, place, attributes, children, self.span, self.path)
+
     def at(self, path: Path) -> Element:
         """Return the element at a path below this one.
 

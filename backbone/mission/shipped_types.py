@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from functools import lru_cache
 from importlib import resources
 
@@ -17,15 +16,11 @@ def shipped_text() -> bytes:
     return resources.files("backbone.mission").joinpath(FILE).read_bytes()
 
 
-def shipped_types() -> list[Element]:
-    """Return a new element for each type, in the order of the file."""
-    return copy.deepcopy(_types())
-
-
 @lru_cache(maxsize=1)
-def _types() -> list[Element]:
+def shipped_types() -> tuple[Element, ...]:
+    """Return the element of each type, in the order of the file; whoever changes one changes a copy."""
     root = parse(shipped_text(), Report(FILE))
     types = None if root is None else root.first("types")
     if types is None:
         raise AssertionError(f"{FILE} has no types")
-    return types.children
+    return tuple(types.children)

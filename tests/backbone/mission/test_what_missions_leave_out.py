@@ -1,5 +1,6 @@
 """What a mission file need not say, and that the shipped ones do not say it."""
 
+import copy
 import math
 import re
 from pathlib import Path
@@ -124,3 +125,9 @@ def test_the_projects_target_rests_where_no_watching_scout_sees_it() -> None:
             distance_m = math.hypot(x_m - scout.x_m, y_m - scout.y_m)
             off_rad = abs(math.atan2(y_m - scout.y_m, x_m - scout.x_m) - scout.heading_rad)
             assert off_rad - math.asin(radius_m / distance_m) > half_view_rad
+
+
+def test_reading_a_mission_changes_no_shipped_type_for_the_next() -> None:
+    before = copy.deepcopy(shipped_types())
+    read_mission(MISSION_XML)
+    assert shipped_types() == before
