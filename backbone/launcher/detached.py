@@ -20,7 +20,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.launcher.bring_up import end_mission
 from backbone.launcher.core_launches import UpOptions
-from backbone.launcher.ending_messages import AwaitEnd, AwaitLastBranch, LastBranchOver, MissionEnded
+from backbone.launcher.ending_messages import AwaitLastBranch, AwaitMissionEnd, LastBranchOver, MissionEnded
 from backbone.launcher.endings import ExitCode, say
 from backbone.launcher.outcome import with_signals
 from backbone.launcher.verdict import await_verdict
@@ -170,7 +170,7 @@ async def _needed(bus: Bus, ended: asyncio.Event) -> str:
     Raises:
         ReplyTimeout: They have not ended within ``ASKED_S``.
     """
-    asking = asyncio.create_task(bus.ask(LAUNCHER, AwaitEnd(), MissionEnded, within_s=ASKED_S))
+    asking = asyncio.create_task(bus.ask(LAUNCHER, AwaitMissionEnd(), MissionEnded, within_s=ASKED_S))
     await first_of(asking, ended.wait())
     if not asking.cancelled():
         with contextlib.suppress(NoResponder, Refusal):  # it died, or it is of another release

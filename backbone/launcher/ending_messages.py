@@ -45,12 +45,12 @@ class LastBranchOver(Message, frozen=True):
     told: Text = ""
 
 
-class AwaitEnd(Message, frozen=True):
+class AwaitMissionEnd(Message, frozen=True):
     """Ask which components a signal ended. The launcher answers when all but the first core services have ended."""
 
 
 class MissionEnded(Message, frozen=True):
-    """Answer to ``AwaitEnd``: all but the nameserver and the component database have ended.
+    """Answer to ``AwaitMissionEnd``: all but the nameserver and the component database have ended.
 
     Attributes:
         signaled: Components that a signal ended, because they were starting or did not answer.
@@ -59,4 +59,4 @@ class MissionEnded(Message, frozen=True):
     signaled: Annotated[list[ProcessEnded], MANY]
 
 
-EndingQuestion = EndMission | AwaitLastBranch | AwaitEnd
+EndingQuestion = EndMission | AwaitLastBranch | AwaitMissionEnd

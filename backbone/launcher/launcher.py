@@ -33,8 +33,8 @@ from backbone.launcher.consoles_end import stop_consoles
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.declared_orders import hardware_orders, unit_orders
 from backbone.launcher.ending_messages import (
-    AwaitEnd,
     AwaitLastBranch,
+    AwaitMissionEnd,
     EndingQuestion,
     EndMission,
     LastBranchOver,
@@ -222,7 +222,7 @@ class Launcher(Component[NoParameters]):
             case AwaitLastBranch():
                 await self._last_is_over.wait()
                 return LastBranchOver(self._last.told)
-            case AwaitEnd():
+            case AwaitMissionEnd():
                 await self._has_ended.wait()
                 return MissionEnded(self.outcome.pushed)
         return await super().answer(asked)

@@ -12,7 +12,7 @@ from backbone.component.launch import Launch
 from backbone.creator.messages import EndedBy, ProcessEnded
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.launcher.core_launches import UpOptions
-from backbone.launcher.ending_messages import AwaitEnd, MissionEnded
+from backbone.launcher.ending_messages import AwaitMissionEnd, MissionEnded
 from backbone.launcher.launcher import Launcher
 from backbone.mission.reader import read_mission_bytes
 from backbone.naming import Subsystem
@@ -103,7 +103,7 @@ def test_a_root_that_is_cut_off_delays_no_other_and_the_killed_one_is_named(
             await watcher.is_up.wait()
             began_s = clock.now_s()
             launcher.end("test", at_once=True)
-            ended = await asker.ask(LAUNCHER.address, AwaitEnd(), MissionEnded, within_s=60.0)
+            ended = await asker.ask(LAUNCHER.address, AwaitMissionEnd(), MissionEnded, within_s=60.0)
             await running
             assert [ordered_s[name] - began_s for name in ROOTS] == [0.0, 0.0, 0.0]
             assert clock.now_s() - began_s >= CUT_OFF_S, "the end is only complete when the last root has ended"
