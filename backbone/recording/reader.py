@@ -249,29 +249,68 @@ def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
     Args:
         messages: In the order of sending.
     """
-    lives: dict[str, list[set[int]]] = {}
-    newest: dict[str, tuple[float, float]] = {}
-    began_s, early = math.inf, list[tuple[float, set[int], int]]()
+    lives: dict[str, list[_Life]] = {}
+    began_s = math.inf
     for message in messages:
         began_s = min(began_s, message.heard_s)
         if message.source:
-            number, at_s = newest.get(message.source, (math.inf, -math.inf))
-            if message.sequence <= number and message.at_s > at_s:
-                lives.setdefault(message.source, []).append(set())
-                number = message.sequence
-            lives[message.source][-1].add(message.sequence)
-            if message.at_s < began_s:
-                early.append((message.at_s, lives[message.source][-1], message.sequence))
-            newest[message.source] = max(number, message.sequence), message.at_s
-    for at_s, life, number in early:
-        if at_s < began_s:
-            life.discard(number)
-    missing = {source: sum(map(_gaps, numbers)) for source, numbers in sorted(lives.items())}
+            own = lives.setdefault(message.source, [])
+            if not own or own[-1].is_over(message):
+                own.append(_Life())
+            own[-1].take(message, began_s)
+    missing = {source: sum(life.gaps(began_s) for life in own) for source, own in sorted(lives.items())}
     return {source: count for source, count in missing.items() if count}
 
 
-def _gaps(numbers: set[int]) -> int:
-    return max(numbers) - min(numbers) + 1 - len(numbers) if numbers else 0
+@dataclass(slots=True)
+class _Life:
+    """The message numbers of one life of a sender; it takes the same memory however many they are.
+
+    Attributes:
+        newest: Largest number.
+        lowest: Smallest number that counts.
+        highest: Largest number that counts.
+        count: How many count.
+        at_s: Mission time of the newest message.
+        together: Numbers of that time; only these come in any order.
+        early: Times and numbers of messages that were sent before the recorder heard any; they do not count yet.
+    """
+
+    newest: float = -math.inf
+    lowest: float = math.inf
+    highest: float = -math.inf
+    count: int = 0
+    at_s: float = -math.inf
+    together: set[int] = field(default_factory=set)
+    early: list[tuple[float, int]] = field(default_factory=list)
+
+    def is_over(self, message: Recorded) -> bool:
+        """Return whether this message begins the sender's next life."""
+        return message.sequence <= self.newest and message.at_s > self.at_s
+
+    def take(self, message: Recorded, began_s: float) -> None:
+        """Note the number of a message."""
+        if message.at_s != self.at_s:
+            self.at_s, self.together = message.at_s, set()
+        if message.sequence in self.together:
+            return
+        self.together.add(message.sequence)
+        self.newest = max(self.newest, message.sequence)
+        if message.at_s < began_s:
+            self.early.append((message.at_s, message.sequence))
+        else:
+            self._count(message.sequence)
+
+    def gaps(self, began_s: float) -> int:
+        """Return how many numbers between the lowest and the highest are missing; messages before the begin are not."""
+        for at_s, number in self.early:
+            if at_s >= began_s:
+                self._count(number)
+        return int(self.highest - self.lowest) + 1 - self.count if self.count else 0
+
+    def _count(self, number: int) -> None:
+        self.lowest, self.highest = min(self.lowest, number), max(self.highest, number)
+        self.count += 1
 
 
 def check_index(file: IO[bytes]) -> None:

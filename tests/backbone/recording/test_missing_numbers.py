@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from collections.abc import Iterator
 
 from hypothesis import given
@@ -11,6 +12,7 @@ from backbone.recording.reader import Recorded, missing_numbers
 
 SENDERS = ("resource_pool/scout1", "backbone/rc_manager")
 LONGEST = 12
+MANY = 20_000
 lives = st.lists(st.sets(st.integers(2, LONGEST)).map(lambda later: [1, *sorted(later)]), max_size=3)
 
 
@@ -44,3 +46,18 @@ def test_a_question_from_before_the_begin_is_no_gap_to_the_first_message() -> No
 
 def gaps(numbers: list[int]) -> int:
     return len({*range(1, numbers[-1])} - {*numbers})
+
+
+def test_the_memory_of_the_count_does_not_grow_with_the_recording() -> None:
+    body: dict[str, object] = {}
+    said = (
+        Recorded("scout/night/resource_pool/scout1/log", SENDERS[0], "StoryEvent/1", n, n, n, n * 2, "", body)
+        for n in range(1, MANY + 1)
+    )
+    tracemalloc.start()
+    try:
+        assert missing_numbers(said) == {SENDERS[0]: MANY - 1}
+        _now, most_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most_bytes < MANY
