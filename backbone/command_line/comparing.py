@@ -11,7 +11,7 @@ from backbone.command_line.recording_work import opened
 from backbone.command_line.unusable_file import FileUnusable
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
-from backbone.recording.comparison import Difference, KeyComparison, Named, compared
+from backbone.recording.comparison import Difference, KeyComparison, Named, compared, pairs_in
 from backbone.recording.detection import DetectionRates, Mark, detected, read_marks, sightings, worse
 from backbone.spoken import counted
 
@@ -23,7 +23,9 @@ async def compare(
 ) -> ExitCode:
     """Print where two recordings differ by more than the tolerances; ``REFUSED`` if they do."""
     with opened(first) as one, opened(second) as other:
-        return print_comparison(compared(one.messages(keys), other.messages(keys), tolerances), as_json=as_json)
+        pairs = pairs_in(one.contents().counts, other.contents().counts)
+        found = compared(one.messages(keys), other.messages(keys), tolerances, pairs)
+        return print_comparison(found, as_json=as_json)
 
 
 async def compare_detection(paths: Sequence[Path], marks_file: Path, later_s: float, *, as_json: bool) -> ExitCode:

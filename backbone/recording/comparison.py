@@ -7,14 +7,14 @@ message count, its time of sending does not.
 from __future__ import annotations
 
 import math
-from collections import defaultdict, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import zip_longest
 from typing import Any
 
-from backbone.recording.reader import Recorded
+from backbone.recording.reader import KeyCount, Recorded
 
 Named = tuple[str, str, str]
 """Key without ``scout/<mission>/``, sender, schema."""
@@ -101,7 +101,10 @@ class KeyComparison:
 
 
 def compared(
-    first: Iterable[Recorded], second: Iterable[Recorded], tolerances: Mapping[str, float] | None = None
+    first: Iterable[Recorded],
+    second: Iterable[Recorded],
+    tolerances: Mapping[str, float] | None = None,
+    pairs: Mapping[Named, int] | None = None,
 ) -> dict[Named, KeyComparison]:
     """Return the comparison of each key, sender and schema.
 
@@ -109,6 +112,7 @@ def compared(
         first: Messages of one recording, in their order.
         second: Messages of the other, in their order.
         tolerances: Name or path of a field → largest distance of its numbers that counts as equal.
+        pairs: See ``pairs_in``; None: not known, and a message without partner stays in memory.
     """
     allowed = tolerances or {}
     found: dict[Named, KeyComparison] = defaultdict(KeyComparison)
@@ -117,16 +121,40 @@ def compared(
         for side, message in enumerate(pair):
             if message is None:
                 continue
-            named = (message.key.split("/", 2)[-1], message.source, message.schema)
-            waiting[named][side].append(message)
+            named = _named(message)
             if side:
                 found[named].second += 1
             else:
                 found[named].first += 1
+            number = found[named].second if side else found[named].first
+            if pairs is not None and number > pairs.get(named, number):
+                continue
             firsts, seconds = waiting[named]
+            waiting[named][side].append(message)
             if firsts and seconds:
                 _compare(found[named], firsts.popleft(), seconds.popleft(), allowed)
     return dict(sorted(found.items()))
+
+
+def pairs_in(first: Iterable[KeyCount], second: Iterable[KeyCount]) -> dict[Named, int] | None:
+    """Return the number of pairs of each key, sender and schema, by the indexes of two recordings.
+
+    Returns:
+        The smaller of both numbers, except of messages without a schema: some of those have one in the index, see
+        ``Recorded.schema``. None: a recording has so many keys that its index does not name all.
+    """
+    numbers = (Counter[Named](), Counter[Named]())
+    for number, counts in zip(numbers, (first, second), strict=True):
+        for one in counts:
+            if not one.key:
+                return None
+            number[_named(one)] += one.messages
+    one, other = numbers
+    return {named: min(one[named], other[named]) for named in one | other if named[2]}
+
+
+def _named(one: Recorded | KeyCount) -> Named:
+    return one.key.split("/", 2)[-1], one.source, one.schema
 
 
 def _compare(found: KeyComparison, first: Recorded, second: Recorded, tolerances: Mapping[str, float]) -> None:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import copy
 import math
+import tracemalloc
+from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.recording.comparison import ABSENT, compared
-from backbone.recording.reader import Recorded
+from backbone.recording.comparison import ABSENT, compared, pairs_in
+from backbone.recording.reader import KeyCount, Recorded
 
 KEYS = ("resource_pool/scout1/readings", "resource_pool/scout2/readings")
+MANY = 20_000
 numbers = st.floats(-1e6, 1e6)
 values = st.recursive(
     st.none() | st.booleans() | st.integers(-1000, 1000) | numbers | st.text(max_size=4),
@@ -105,3 +109,38 @@ def test_a_tolerance_may_name_the_whole_path():
     [found] = compared(first, second, {"at.x": 1.0}).values()
     assert found.difference is not None
     assert found.difference.field == "x"
+
+
+@given(first=recordings, second=recordings)
+def test_known_numbers_of_pairs_change_no_result(
+    first: list[tuple[str, dict[str, Any]]], second: list[tuple[str, dict[str, Any]]]
+):
+    one, other = messages(first), messages(second)
+    assert compared(one, other, None, pairs_in(counts(one), counts(other))) == compared(one, other)
+
+
+def test_a_message_without_a_schema_is_compared_though_the_index_gives_it_one():
+    """A message nested too deeply to be decoded is compared as bytes, and its channel has a schema."""
+    one, other = ([replace(found, schema="") for found in messages([(KEYS[0], {"x": x})])] for x in (1.0, 2.0))
+    indexed = counts(messages([(KEYS[0], {})]))
+    [found] = compared(one, other, None, pairs_in(indexed, indexed)).values()
+    assert found.differing == 1
+
+
+def test_messages_without_a_partner_take_no_memory():
+    body = {"x": 1.0}
+    said = (Recorded(f"scout/night/{KEYS[0]}", "scout1", "Readings/1", n, n, n, n, "", body) for n in range(MANY))
+    index = [KeyCount(f"scout/night/{KEYS[0]}", "scout1", "Readings/1", MANY)]
+    tracemalloc.start()
+    try:
+        [found] = compared(said, [], None, pairs_in(index, [])).values()
+        _now, most_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert (found.first, found.second) == (MANY, 0)
+    assert most_bytes < MANY
+
+
+def counts(said: list[Recorded]) -> list[KeyCount]:
+    """Return the index of a recording."""
+    return [KeyCount(*named, number) for named, number in Counter((m.key, m.source, m.schema) for m in said).items()]
