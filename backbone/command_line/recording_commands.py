@@ -5,7 +5,7 @@ Rules of this file: as those of ``cli``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
@@ -263,7 +263,9 @@ def print_mission(file: File) -> None:
 
 def replay(
     file: File,
-    speed: Annotated[float, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second.")] = 1.0,
+    speed: Annotated[
+        float | None, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second; default: 1.")
+    ] = None,
     is_stepped: Annotated[
         bool, typer.Option("--step", help="Message by message: a line of input plays the one that is shown.")
     ] = False,
@@ -298,14 +300,25 @@ def replay(
         raise typer.BadParameter("--without needs the name of a component")
     if len(names) > 1 and (class_path or given or "rc_manager" in names):
         raise typer.BadParameter("--class, --set and the rc_manager are for a single --without NAME")
+    if names:
+        _refuse({"--speed": speed, "--step": is_stepped, "--keys": keys, "--mission": mission}, "--without NAME")
     if names == ["rc_manager"]:
+        _refuse({"--class": class_path, "--tolerance": allowed}, "--without rc_manager")
         run(lambda: replaying.decide_anew(file, since_s or 0.0, given, as_json=as_json))
     if names:
+        _refuse({"--from": since_s}, "--without NAME, except rc_manager")
         run(lambda: replaying.run_without(file, names, class_path, given, allowed, as_json=as_json))
     if class_path or given or allowed or as_json:
         raise typer.BadParameter("--class, --set, --tolerance and --json are for --without NAME")
-    wanted = replaying.Playing(mission, since_s, speed, is_stepped, tuple(keys or ()))
+    wanted = replaying.Playing(mission, since_s, speed or 1.0, is_stepped, tuple(keys or ()))
     run(lambda: replaying.play(file, wanted))
+
+
+def _refuse(options: Mapping[str, object], with_what: str) -> None:
+    """Refuse options that would have no effect."""
+    given = [name for name, value in options.items() if value not in (None, False, "", {}, [])]
+    if given:
+        raise typer.BadParameter(f"{', '.join(given)}: no effect with {with_what}")
 
 
 def compare(

@@ -41,6 +41,18 @@ def complaint_of(
             "compare a b c",
             "two recordings are compared; more or one only with --detect (See 'scout-backbone compare --help'.)",
         ),
+        (
+            "replay a --without b --from 5",
+            "--from: no effect with --without NAME, except rc_manager (See 'scout-backbone replay --help'.)",
+        ),
+        (
+            "replay a --without b --speed 1 --step --keys c --mission d",
+            "--speed, --step, --keys, --mission: no effect with --without NAME (See 'scout-backbone replay --help'.)",
+        ),
+        (
+            "replay a --without rc_manager --class b:C --tolerance x=0",
+            "--class, --tolerance: no effect with --without rc_manager (See 'scout-backbone replay --help'.)",
+        ),
     ],
 )
 def test_wrong_words_are_a_refusal_with_a_remedy(
