@@ -18,6 +18,7 @@ from backbone.recording.comparison import KeyComparison, NumberError, compared
 from backbone.recording.reader import NoRecording, Recording
 
 OTHER = "resource_pool/scout2"
+EVENT = StoryEvent(0.0, SCOUT, "seen", "", "", LogLevel.INFO)
 
 
 def events(*texts: str) -> Recording:
@@ -65,3 +66,12 @@ async def test_of_two_files_the_one_that_is_no_recording_is_named(tmp_path: Path
     with pytest.raises(NoRecording, match=r"bad\.mcap: no recording: the file is empty") as refused:
         await comparing.compare(good, bad, (), {}, as_json=False)
     assert "recover" not in refused.value.remedy
+
+
+async def test_keys_that_no_message_has_are_refused(tmp_path: Path) -> None:
+    """Else a wrong word in a nightly comparison counts as equal."""
+    night = tmp_path / "night.mcap"
+    night.write_bytes(recorded([Said(1.0, SCOUT, Conversation.LOG, EVENT)]).getvalue())
+    with pytest.raises(comparing.NothingToCompare, match="matches \\*/redings"):
+        await comparing.compare(night, night, ("*/redings",), {}, as_json=False)
+    assert await comparing.compare(night, night, ("*/log",), {}, as_json=False) is ExitCode.DONE
