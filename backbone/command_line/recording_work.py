@@ -306,14 +306,16 @@ async def print_messages(
     path: Path, keys: tuple[str, ...], since_s: float, until_s: float | None, most: int, *, as_json: bool
 ) -> ExitCode:
     """Print a line for each message, at most ``most``."""
-    left_out = 0
+    found = 0
     with opened(path) as recording:
-        for number, message in enumerate(recording.messages(keys, since_s, until_s)):
-            if number >= most:
-                left_out += 1
-            else:
+        for message in recording.messages(keys, since_s, until_s):
+            found += 1
+            if found <= most:
                 show([json.dumps(message_json(message)) if as_json else message_line(message)])
-    if left_out:
+    left_out = found - most
+    if not found:
+        say("no message")
+    if left_out > 0:
         say(f"{counted(left_out, 'later message')} left out; see --most, --since and --keys")
     return ExitCode.DONE
 

@@ -104,8 +104,13 @@ async def print_reasons_at(path: Path, name: str, at_s: float | None, *, as_json
 
 
 async def decide_anew(path: Path, since_s: float, rules: dict[str, Any], *, as_json: bool) -> ExitCode:
-    """Let today's scheduler decide on the recorded events; print the first decision that differs from the recording."""
+    """Let today's scheduler decide on the recorded events; print the first decision that differs from the recording.
+
+    Raises:
+        NoSuchTime: The recording had ended.
+    """
     with opened(path) as recording:
+        _require_recorded(since_s, recording.contents())
         found = decided_anew(recording, since_s, **rules)
     if as_json:
         show([json.dumps(_json(found))])
@@ -203,7 +208,7 @@ def _require_recorded(at_s: float, found: Contents) -> None:
         NoSuchTime: It has ended.
     """
     if at_s > max(found.end_s, round(found.end_s, 3)):  # 'recording info' rounds it
-        raise NoSuchTime(f"the recording ends at {found.end_s:.3f} s")
+        raise NoSuchTime(f"the recording ends at {found.end_s:.3f} s", remedy="Name an earlier time.")
 
 
 def _announce(bus: Bus, clock: Clock, what: str) -> None:

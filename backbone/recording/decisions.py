@@ -30,11 +30,14 @@ from backbone.spoken import counted
 _DECISIONS = tuple(f"{RC_MANAGER}/{conversation}" for conversation in (Conversation.DECISIONS, Conversation.ASK))
 
 
+FROM_THE_BEGIN = "Record from the begin: scout-backbone up MISSION.xml --record FILE.mcap."
+
+
 class NotRecorded(Refusal):
     """The recording does not have the schedule of that time."""
 
     code = "recording.no_schedule"
-    remedy = "Choose a later time, or record from the begin: scout-backbone up MISSION.xml --record FILE.mcap."
+    remedy = f"Choose a later time. {FROM_THE_BEGIN}"
 
 
 class NoSuchRule(Refusal):
@@ -208,7 +211,10 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
             return found
     if not began:
         without = f", without {counted(reviver.unread, 'message')} of another form" if reviver.unread else ""
-        raise NotRecorded(f"the recording has no state of the schedule{without}")
+        if since_s > 0.0:
+            after = f"the recording has no state of the schedule after {since_s:.3f} s{without}"
+            raise NotRecorded(after, remedy="Choose an earlier time, or leave out --from.")
+        raise NotRecorded(f"the recording has no state of the schedule{without}", remedy=FROM_THE_BEGIN)
     if anew is not None and rules:
         last_s = max(message.at_s for message in recording.messages(source=RC_MANAGER))
         found.difference = anew.of_itself(number + 1, last_s)

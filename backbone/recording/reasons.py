@@ -45,7 +45,8 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
         why = None
     if why is None and component is None and absence is None:
         hint = did_you_mean(name, said.states)
-        raise UnknownName(f"the recording has nothing about {name!r} before {at_s:.3f} s{hint}", name=name)
+        unknown = f"the recording has nothing about {name!r} before {at_s:.3f} s{hint}"
+        raise UnknownName(unknown, name=name, remedy="See 'scout-backbone recording keys FILE' for its components.")
     unread = reviver.unread
     remarks = [f"incomplete: {counted(unread, 'message')} of another form cannot be read"] if unread else []
     if component is None or name not in said.left_s:

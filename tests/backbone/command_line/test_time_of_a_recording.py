@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 from small_recordings import SCOUT, Said, recorded
 
-from backbone.command_line.replaying import Playing, play, print_reasons_at
+from backbone.command_line.recording_work import print_messages
+from backbone.command_line.replaying import Playing, decide_anew, play, print_reasons_at
 from backbone.component.messages import ComponentState, LifeState
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
+from backbone.recording.decisions import NotRecorded
 from backbone.recording.playback import NoSuchTime
 
 END_S, SHOWN_END_S, AFTERWARDS_S = 2.0006, 2.001, 2.0015
@@ -38,3 +40,20 @@ async def test_afterwards_no_reasons_are_told_and_nothing_is_played(night: Path,
         await print_reasons_at(night, "scout1", at_s, as_json=False)
     with pytest.raises(NoSuchTime, match=r"ends at 2\.001 s"):
         await play(night, Playing("late", at_s, 1.0, is_stepped=False, keys=()))
+    with pytest.raises(NoSuchTime, match=r"ends at 2\.001 s") as refused:
+        await decide_anew(night, at_s, {}, as_json=False)
+    assert refused.value.remedy == "Name an earlier time."
+
+
+@pytest.mark.parametrize(("since_s", "remedy"), [(1.5, "Choose an earlier time"), (0.0, "Record from the begin")])
+async def test_the_remedy_for_a_missing_schedule_depends_on_the_time(night: Path, since_s: float, remedy: str) -> None:
+    with pytest.raises(NotRecorded) as refused:
+        await decide_anew(night, since_s, {}, as_json=False)
+    assert refused.value.remedy.startswith(remedy)
+
+
+async def test_where_nothing_was_sent_no_message_is_printed_and_said(
+    night: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    await print_messages(night, (), AFTERWARDS_S, None, 1, as_json=False)
+    assert capsys.readouterr() == ("", "no message\n")

@@ -18,6 +18,7 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
+from backbone.nameserver.messages import UnknownName
 from backbone.rc_manager.messages import AskWhy, Decided
 from backbone.recording.decisions import NoSuchRule, NotRecorded, decided_anew, schedule_at
 from backbone.recording.hearing import to_overhear
@@ -254,3 +255,9 @@ def test_without_a_snapshot_there_is_no_schedule(recorded: RecordMission):
         reasons_at(recording, "nobody", 10.0)
     with pytest.raises(NotRecorded):
         decided_anew(recording)
+
+
+def test_the_remedy_for_an_unknown_name_needs_no_mission(recorded: RecordMission):
+    with pytest.raises(UnknownName) as refused:
+        reasons_at(recorded(1), "nobody", 10.0)
+    assert "recording keys" in refused.value.remedy
