@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from importlib import import_module
@@ -20,7 +20,9 @@ from backbone.spoken import counted
 
 VIDEOS = "mission_control.vision.recorded_video"  # named as text, because imports run downwards only
 DATA_SETS = "mission_control.training_data.lerobot_dataset"  # as text for the same reason
-ROWS_AT_ONCE = 1000  # chosen: so many rows of each table are in memory, and in a row group of Parquet
+ROWS_AT_ONCE = 1000  # chosen: so many rows of a table are in memory, and in a row group of Parquet
+MOST_WAITING_BYTES = 1 << 26  # chosen: a mission of hundreds of keys needs no more, and a table's batch stays large
+COLUMN_BYTES = 150  # measured: a value in its dictionary, with the name of its column
 
 
 class TableWriter(Protocol):
@@ -116,11 +118,27 @@ def _commanded_rows(
 def _batches(
     names: FileNames, rows: Iterable[tuple[Recorded, dict[str, object]]]
 ) -> Iterator[tuple[str, list[dict[str, object]]]]:
-    """Yield table and rows, up to ``ROWS_AT_ONCE`` of them."""
+    """Yield table and rows, up to ``ROWS_AT_ONCE`` of them; fewer, if all tables have ``MOST_WAITING_BYTES``."""
     waiting: dict[str, list[dict[str, object]]] = defaultdict(list)
+    sizes = Counter[str]()
+    waiting_bytes = 0
     for message, row in rows:
-        table = names.of(message.key, message.schema or "bytes")
+        table, size = names.of(message.key, message.schema or "bytes"), _size(row)
         waiting[table].append(row)
+        sizes[table] += size
+        waiting_bytes += size
         if len(waiting[table]) >= ROWS_AT_ONCE:
-            yield table, waiting.pop(table)
+            full = table
+        elif waiting_bytes > MOST_WAITING_BYTES:
+            full = max(sizes, key=sizes.__getitem__)
+        else:
+            continue
+        waiting_bytes -= sizes.pop(full)
+        yield full, waiting.pop(full)
     yield from waiting.items()
+
+
+def _size(row: Mapping[str, object]) -> int:
+    """Return roughly how many bytes a row takes in memory."""
+    long = (value for value in row.values() if isinstance(value, str | bytes | list))
+    return COLUMN_BYTES * len(row) + sum(map(len, long))

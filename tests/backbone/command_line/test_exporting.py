@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
 from pyarrow import parquet
 from small_recordings import SCOUT, Said, recorded
 
+from backbone.command_line import exporting
 from backbone.command_line.exporting import ROWS_AT_ONCE, CsvTables, export
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
@@ -21,6 +23,7 @@ from backbone.scheduling.requests import RcUse, RequestState
 from backbone.scheduling.views import RequestView, Schedule
 from resource_pool.messages import Applied, Readings
 
+TABLES, ROWS = 6, 40
 RC_MANAGER, ARC = "backbone/rc_manager", "watch-drive"
 WAITS = RequestView(ARC, "mission_control/watch", RequestState.WAITING, [], 0.0, -1.0, 2.0, "", [], 5.0, "night:1", 0)
 APPLIED, READINGS = "resource_pool_scout1_motions_Applied", "resource_pool_scout1_readings_Readings"
@@ -97,6 +100,36 @@ async def test_keys_whose_parts_join_to_the_same_name_have_files_of_their_own(tm
 def scout_backbone(*words: str, begin: str = "") -> subprocess.CompletedProcess[str]:
     code = f"import sys\n{begin}\nfrom backbone.command_line.cli import app; app({list(words)!r})"
     return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+
+
+async def test_rows_of_many_tables_do_not_wait_for_full_batches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Hundreds of keys with a thousand rows each would fill the memory."""
+    batches = list[int]()
+
+    class Tables(CsvTables):
+        def learn(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
+            batches.append(len(rows))
+            super().learn(table, rows)
+
+    robots = [f"resource_pool/robot{number}" for number in range(TABLES)]
+    said = [
+        Said(at_s, robot, Conversation.READINGS, Readings("", at_s, {"way_m": at_s}), robot)
+        for at_s in map(float, range(ROWS))
+        for robot in robots
+    ]
+    night = tmp_path / "night.mcap"
+    night.write_bytes(recorded(said).getvalue())
+    await export(night, tmp_path / "whole", (), Tables, with_videos=False)
+    assert batches == [ROWS] * TABLES
+    batches.clear()
+    monkeypatch.setattr(exporting, "MOST_WAITING_BYTES", TABLES * ROWS * exporting.COLUMN_BYTES)
+    await export(night, tmp_path / "parts", (), Tables, with_videos=False)
+    assert max(batches) < ROWS
+    assert len(batches) < TABLES * ROWS / 2
+    for whole in (tmp_path / "whole").iterdir():
+        assert whole.read_text() == (tmp_path / "parts" / whole.name).read_text()
 
 
 @pytest.mark.processes
