@@ -23,7 +23,7 @@ from backbone.bus.interface import Bus
 from backbone.command_line.joining import clock_lines, clocks_json
 from backbone.command_line.message_lines import message_json, message_line
 from backbone.command_line.options import DISTRIBUTION
-from backbone.command_line.unusable_file import FileUnusable
+from backbone.command_line.unusable_file import FileUnusable, unwritable
 from backbone.command_line.watching import mission_classes
 from backbone.command_line.where import Where
 from backbone.component.messages import AskTime, MissionTime, StoryEvent
@@ -235,7 +235,7 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
     except FileExistsError as error:
         raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
     except OSError as error:
-        raise FileUnusable(f"{error.filename or to}: {error.strerror or error}") from error
+        raise unwritable(error.filename or to, error) from error
     with opened(to) as made:
         assert made.contents().messages == done.messages  # noqa: S101  what was written can be read
     without = f", without {counted(done.damaged, 'damaged part')} of {path}" if done.damaged else ""

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from backbone.launcher.endings import ExitCode, say
 
 _STREAMS = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
-_NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
+NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
+HAS_ROOM = "Write it to a disk that has room."
 
 
 @contextlib.contextmanager
@@ -32,11 +33,11 @@ def standard_streams() -> Iterator[None]:
         finally:
             sys.stdout.flush()
     except OSError as error:
-        if error.filename is not None or error.errno not in (*_NO_ROOM, errno.EPIPE):
+        if error.filename is not None or error.errno not in (*NO_ROOM, errno.EPIPE):
             raise
         _drop_output()
         if error.errno != errno.EPIPE:  # a reader that has stopped knows it
-            say(f"the output cannot be written: {error.strerror} (Write it to a disk that has room.)")
+            say(f"the output cannot be written: {error.strerror} ({HAS_ROOM})")
         sys.exit(ExitCode.UNEXPECTED)
 
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+from backbone.command_line.standard_streams import HAS_ROOM, NO_ROOM
 from backbone.errors import Refusal
 
 
@@ -36,7 +37,7 @@ def new_file(path: Path) -> Iterator[IO[bytes]]:
     except FileExistsError as error:
         raise FileUnusable(f"{path} exists", remedy="Name a new file.") from error
     except OSError as error:
-        raise FileUnusable(f"{path}: {error.strerror or error}") from error
+        raise unwritable(path, error) from error
 
 
 @contextmanager
@@ -56,4 +57,10 @@ def new_folder(folder: Path) -> Iterator[None]:
     except FileExistsError as error:
         raise FileUnusable(f"{folder} exists", remedy="Name a new folder.") from error
     except OSError as error:
-        raise FileUnusable(f"{error.filename or folder}: {error.strerror or error}") from error
+        raise unwritable(error.filename or folder, error) from error
+
+
+def unwritable(path: Path | str, error: OSError) -> FileUnusable:
+    """Return the refusal of a file that cannot be written."""
+    remedy = HAS_ROOM if error.errno in NO_ROOM else FileUnusable.remedy
+    return FileUnusable(f"{path}: {error.strerror or error}", remedy=remedy)

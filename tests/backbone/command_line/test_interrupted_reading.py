@@ -173,11 +173,14 @@ NEW: list[Command] = [
 names_of_new = pytest.mark.parametrize("command", NEW, ids=["join", "export", "foxglove"])
 
 
-@names_of_new
-def test_what_finds_no_room_leaves_nothing_and_can_be_repeated(command: Command, night: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", [*NEW, recording_work.recover_to], ids=["join", "export", "foxglove", "recover"])
+def test_what_finds_no_room_leaves_nothing_and_can_be_repeated(
+    command: Command, night: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     new = tmp_path / "new.mcap"
     with disk_full_at(1000):
         assert event_loop.exit_code_of(lambda: command(night, new)) == ExitCode.USAGE
+    assert "(Write it to a disk that has room.)" in capsys.readouterr().err
     assert not new.exists()
     assert event_loop.exit_code_of(lambda: command(night, new)) == ExitCode.DONE
 
