@@ -145,10 +145,10 @@ def pairs_in(first: Iterable[KeyCount], second: Iterable[KeyCount]) -> dict[Name
     """
     numbers = (Counter[Named](), Counter[Named]())
     for number, counts in zip(numbers, (first, second), strict=True):
-        for one in counts:
-            if not one.key:
+        for count in counts:
+            if not count.key:
                 return None
-            number[_named(one)] += one.messages
+            number[_named(count)] += count.messages
     one, other = numbers
     return {named: min(one[named], other[named]) for named in one | other if named[2]}
 
