@@ -22,7 +22,7 @@ LONGEST_VALUE = 60  # chosen: two of them fit a line of a wide terminal
 class NothingToCompare(Refusal):
     """No message of two recordings is selected."""
 
-    code = "recording.keys"
+    code = "recording.no_message"
     remedy = "See 'scout-backbone recording keys FILE' for the keys of a recording."
 
 
