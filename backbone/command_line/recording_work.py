@@ -35,7 +35,7 @@ from backbone.launcher.messages import AskTree, Tree
 from backbone.launcher.recorder_beats import RecorderBeats, address_of_recorder
 from backbone.launcher.recorder_signs import RecorderSigns
 from backbone.mission_log.lines import event_json, story_lines
-from backbone.mission_log.log import FOR_EVER_S, AskLog, MissionLog
+from backbone.mission_log.log import FOR_EVER_S, AskLog, chosen
 from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.operating_system.ending_signals import interruptible, orders_to_end
 from backbone.operating_system.own_process import go_behind_others
@@ -320,19 +320,21 @@ async def print_messages(
     return ExitCode.DONE
 
 
+def _events_of(recording: Recording, reviver: Reviver) -> Iterator[StoryEvent]:
+    """Yield the events of the recording, and its operators' actions as events."""
+    for message in recording.messages((f"*/{Conversation.LOG}", f"*/{Conversation.OPERATORS}")):
+        match reviver.revived(message, StoryEvent, OperatorActed):
+            case StoryEvent() as event:
+                yield event
+            case OperatorActed() as act:
+                yield act.event(message.source, message.cause)
+
+
 async def print_events(path: Path, name: str, since_s: float, until_s: float | None, *, as_json: bool) -> ExitCode:
     """Print all events about a name, as the live mission would print those that it keeps."""
+    asked, reviver = AskLog(since_s, FOR_EVER_S if until_s is None else until_s, name), Reviver()
     with opened(path) as recording:
-        most = recording.contents().messages
-        log, reviver = MissionLog(kept=most), Reviver()
-        for message in recording.messages((f"*/{Conversation.LOG}", f"*/{Conversation.OPERATORS}")):
-            match reviver.revived(message, StoryEvent, OperatorActed):
-                case StoryEvent() as event:
-                    log.add(event)
-                case OperatorActed() as act:
-                    log.add(act.event(message.source, message.cause))
-    asked = AskLog(since_s, FOR_EVER_S if until_s is None else until_s, name, most=most)
-    events = printable_all(log.answer(asked)).events
+        events = printable_all(chosen(_events_of(recording, reviver), asked))
     show([json.dumps(event_json(event)) for event in events] if as_json else story_lines(events))
     if not events:
         say(f"no event about {name}" if name else "no event")

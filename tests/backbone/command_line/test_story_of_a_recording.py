@@ -11,7 +11,8 @@ from backbone.command_line.recording_work import print_events, print_keys
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
-from backbone.mission_log.log import EVENTS_KEPT
+from backbone.mission_log.log import EVENTS_KEPT, MOST_EVENTS_BYTES
+from backbone.ranges import LONGEST_TEXT
 
 EACH_S = 0.5
 MANY = EVENTS_KEPT + 5  # more than a mission keeps
@@ -40,6 +41,16 @@ async def test_each_event_of_that_time_is_printed(
     assert await print_events(night(tmp_path, count), "scout1", since_s, until_s, as_json=False) is ExitCode.DONE
     lines = capsys.readouterr().out.splitlines()
     assert [line.rpartition(" ")[2] for line in lines] == [str(number) for number in numbers]
+
+
+async def test_more_events_than_fit_one_message_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    long = "x" * LONGEST_TEXT
+    count = MOST_EVENTS_BYTES // len(long) + 2
+    events = (StoryEvent(at, SCOUT, f"{at} {long}"[:LONGEST_TEXT], "scout1", "", LogLevel.INFO) for at in range(count))
+    path = tmp_path / "night.mcap"
+    path.write_bytes(recorded(Said(event.at_s, SCOUT, Conversation.LOG, event) for event in events).getvalue())
+    assert await print_events(path, "scout1", 0.0, None, as_json=True) is ExitCode.DONE
+    assert len(capsys.readouterr().out.splitlines()) == count
 
 
 async def test_an_event_of_several_lines_is_one_line_and_forges_no_other(
