@@ -92,7 +92,10 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
         await first_of(ended.wait(), enough.wait())
         enough.set()
     await printer.end()
-    if came and not shown:
+    if not came:
+        at_keys = f" at {' or '.join(wanted.keys)}; see 'scout-backbone top'" if wanted.keys else ""
+        say(f"no message came{at_keys}")
+    elif not shown:
         say(f"none of {counted(came, 'message')} has a value in {wanted.field!r}; --json shows their fields")
     if dropped := printer.dropped + sum(one.dropped for one in subscribed):
         say(f"incomplete: {counted(dropped, 'message')} came faster than they were read")

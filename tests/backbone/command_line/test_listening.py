@@ -201,6 +201,24 @@ def test_who_watches_is_told_of_an_absence_of_the_hub(
     assert told in capfd.readouterr().err.splitlines()
 
 
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [((), "no message came"), (("a//b", "*/[c"), "no message came at a//b or */[c; see 'scout-backbone top'")],
+)
+def test_an_end_without_a_message_is_told(
+    keys: tuple[str, ...], told: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    network, clock = LocalNetwork("night"), VirtualClock()
+
+    @asynccontextmanager
+    async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
+        yield LocalBus(network, SELF, clock), clock
+
+    monkeypatch.setattr(watching, "connected", connected)
+    run_virtual(watching.watch(ANY, Watched(keys, for_s=1.0)))
+    assert told in capfd.readouterr().err.splitlines()
+
+
 @pytest.mark.parametrize(("field", "is_told"), [("what", False), ("waht", True)])
 def test_a_field_that_no_message_has_is_told(
     field: str, is_told: bool, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
