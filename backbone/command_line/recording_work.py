@@ -305,18 +305,16 @@ def _rate(messages: int, lasted_s: float) -> str:
 async def print_messages(
     path: Path, keys: tuple[str, ...], since_s: float, until_s: float | None, most: int, *, as_json: bool
 ) -> ExitCode:
-    """Print a line for each message, at most ``most``."""
+    """Print a line for each message, at most ``most``; the file is read no further than that."""
     found = 0
     with opened(path) as recording:
-        for message in recording.messages(keys, since_s, until_s):
-            found += 1
-            if found <= most:
-                show([json.dumps(message_json(message)) if as_json else message_line(message)])
-    left_out = found - most
+        for found, message in enumerate(recording.messages(keys, since_s, until_s), 1):
+            if found > most:
+                say("later messages are left out; see --most, --since and --keys")
+                break
+            show([json.dumps(message_json(message)) if as_json else message_line(message)])
     if not found:
         say("no message")
-    if left_out > 0:
-        say(f"{counted(left_out, 'later message')} left out; see --most, --since and --keys")
     return ExitCode.DONE
 
 

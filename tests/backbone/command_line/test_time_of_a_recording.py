@@ -57,3 +57,12 @@ async def test_where_nothing_was_sent_no_message_is_printed_and_said(
 ) -> None:
     await print_messages(night, (), AFTERWARDS_S, None, 1, as_json=False)
     assert capsys.readouterr() == ("", "no message\n")
+
+
+async def test_what_is_left_out_is_said(night: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    await print_messages(night, (), 0.0, None, 1000, as_json=False)
+    count = len(capsys.readouterr().out.splitlines())
+    for most, says in ((count, ""), (count - 1, "later messages are left out; see --most, --since and --keys\n")):
+        await print_messages(night, (), 0.0, None, most, as_json=False)
+        shown = capsys.readouterr()
+        assert (len(shown.out.splitlines()), shown.err) == (most, says)
