@@ -17,6 +17,7 @@ A change of a struct that old readers cannot read gets a new version: ``class Dr
 from __future__ import annotations
 
 import dataclasses
+import re
 import types
 import typing
 from collections.abc import Hashable, Mapping
@@ -42,6 +43,7 @@ from backbone.ranges import (
 WIRE_VERSION = 1
 MAX_MESSAGE_BYTES = 8 * 1024 * 1024  # chosen: a 1080p colour frame (6.2 MB) fits, a runaway list does not
 MAX_LARGE_MESSAGE_BYTES = 64 << 20  # chosen: a 4K picture in color is 25 MB; of ``LARGE`` conversations on a host
+BODY = "$[5]"  # of an ``Envelope``, in a complaint of msgspec
 LONGEST_QUOTED = 100  # chosen: a name and the first words of a sentence, in a refusal
 
 
@@ -109,7 +111,7 @@ class MalformedMessage(Refusal):
     """The bytes are no valid message of an accepted schema."""
 
     code = "wire.malformed"
-    remedy = "Send the struct as documented, unchanged and whole."
+    remedy = "Give each field a value of its declared type and range, and send all fields."
 
 
 class OversizedMessage(Refusal):
@@ -214,6 +216,22 @@ def plain(value: object) -> Any:
     return value
 
 
+def naming_field(complaint: str, kind: type[Message], body: str = "$") -> str:
+    """Return a complaint of msgspec about a message with the field's name in place of its number.
+
+    Args:
+        body: The place of the message in what was read.
+
+    Example:
+        >>> naming_field("Expected `str`, got `int` - at `$[1]`", Refused)
+        'Expected `str`, got `int`, in code'
+    """
+    found = re.fullmatch(rf"(?P<what>.*) - at `{re.escape(body)}\[(?P<number>[1-9]\d*)\](?P<within>.*)`", complaint)
+    if found is None or int(found["number"]) > len(kind.__struct_fields__):
+        return complaint
+    return f"{found['what']}, in {kind.__struct_fields__[int(found['number']) - 1]}{found['within']}"
+
+
 class Reader(Generic[Body]):
     """Reads the messages of one conversation.
 
@@ -222,7 +240,8 @@ class Reader(Generic[Body]):
     """
 
     def __init__(self, accepts: type[Body] | types.UnionType) -> None:
-        self._accepted = tuple(sorted(schema_of(kind) for kind in kinds_of(accepts)))
+        self._kinds = {schema_of(kind): kind for kind in kinds_of(accepts)}
+        self._accepted = tuple(sorted(self._kinds))
         self._decoder = msgspec.msgpack.Decoder(Envelope[accepts])  # type: ignore[valid-type]
         self._of_any_kind = frozenset(
             kind for kind in kinds_of(accepts) if holds_values_of_any_kind(cast("Hashable", kind))
@@ -266,8 +285,8 @@ class Reader(Generic[Body]):
 
     def _diagnose_schema(self, schema: str, complaint: str) -> Refusal:
         name, _, version = schema.partition("/")
-        if schema in self._accepted:
-            return MalformedMessage(f"{schema}: {complaint}", schema=schema)
+        if kind := self._kinds.get(schema):
+            return MalformedMessage(f"{schema}: {naming_field(complaint, kind, BODY)}", schema=schema)
         for known in self._accepted:
             if known.partition("/")[0] == name:
                 return WrongVersion(

@@ -16,7 +16,7 @@ import msgspec
 
 from backbone.errors import Refusal
 from backbone.ranges import Count, Epoch, Mention, Speed, TurnRate, WheelSpeed
-from backbone.wire import Message
+from backbone.wire import Message, naming_field
 
 
 class Command(Message, frozen=True, kw_only=True):
@@ -80,7 +80,7 @@ def command_of(kind: type[Command], values: Mapping[str, object], *, role: str, 
     try:
         return msgspec.convert([kind.__struct_config__.tag, *given, role, after_stop], kind)
     except msgspec.ValidationError as error:
-        raise WrongCommand(f"{kind.word()}: {error}") from None
+        raise WrongCommand(f"{kind.word()}: {naming_field(str(error), kind)}") from None
 
 
 def clipped(order: Command, limits: Mapping[str, tuple[float, float]]) -> dict[str, float]:

@@ -45,9 +45,9 @@ def test_a_command_by_its_values_is_the_command_itself(command: Command, role: s
     [
         (Move, {"forwards": 1.0}, "move has no field forwards; its fields: forward_m_s, turn_rad_s"),
         (Move, {"turn_rad_s": 1.0}, "move needs a value of forward_m_s"),
-        (Move, {"forward_m_s": "quick"}, "Expected `float`, got `str`"),
+        (Move, {"forward_m_s": "quick"}, "Expected `float`, got `str`, in forward_m_s"),
         (Move, {"forward_m_s": float("nan")}, "Expected `float`"),
-        (Shine, {"brightness": 1.5}, "<= 1"),
+        (Shine, {"brightness": 1.5}, "<= 1.0, in brightness"),
         (Halt, {"epoch": 3}, "halt has no field epoch; its fields: none"),
         (Halt, {"arc": "other"}, "halt has no field arc"),
     ],
