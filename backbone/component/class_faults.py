@@ -1,12 +1,14 @@
 """Faults of a component's class that show without an instance of it.
 
-A caller that expects a plain method does not await an async one, which then does nothing. An object lacks attributes if
-its constructor does not call that of the base class. Parameters that only the type checker knows are never read.
+A caller that expects a plain method does not await an async one, which then does nothing. A hook with a misspelt name
+is never called. An object lacks attributes if its constructor does not call that of the base class. Parameters that
+only the type checker knows are never read.
 """
 
 from __future__ import annotations
 
 import inspect
+import itertools
 import typing
 from collections.abc import Iterator
 
@@ -29,6 +31,7 @@ def class_faults(kind: type) -> Iterator[str]:
         own, base = definitions[0], definitions[-1]
         if own is not base and not name.startswith("__"):
             yield from fault_of_method(name, own, base, "the base class")
+    yield from _of_names(kind)
     yield from _of_constructors(kind)
     yield from _of_parameters(kind)
 
@@ -60,6 +63,25 @@ def _can_be_awaited(function: typing.Any) -> bool:
     plain = inspect.unwrap(function)
     result = str(inspect.signature(plain).return_annotation)
     return inspect.iscoroutinefunction(plain) or any(word in result for word in ("Awaitable", "Coroutine", "Future"))
+
+
+def _of_names(kind: type) -> Iterator[str]:
+    """Yield a fault for each new method whose name is one letter off a method that no derived class overrides."""
+    methods = [name for name in dir(kind) if name[0] != "_" and inspect.isfunction(getattr(kind, name))]
+    makers = {name: [one for one in kind.__mro__ if name in vars(one)] for name in methods}
+    for own, base in itertools.permutations([name for name in methods if len(makers[name]) == 1], 2):
+        maker, meant = makers[own][0], makers[base][0]
+        if maker is not meant and issubclass(maker, meant) and _is_one_letter_off(own, base):
+            yield f"{own} looks like {base} misspelt, which is not overridden; write {base}, or a less similar name"
+
+
+def _is_one_letter_off(name: str, other: str) -> bool:
+    """Return whether one letter is wrong, missing, too many, or in another place."""
+    return not {name, *_without_a_letter(name)}.isdisjoint({other, *_without_a_letter(other)})
+
+
+def _without_a_letter(name: str) -> list[str]:
+    return [name[:index] + name[index + 1 :] for index in range(len(name))]
 
 
 def _of_constructors(kind: type) -> Iterator[str]:

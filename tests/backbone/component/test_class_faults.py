@@ -16,6 +16,8 @@ from backbone.mission.class_probe import facts_of
 from backbone.shipped import is_shipped
 from mission_control.behavior import Behavior, BehaviorParameters
 from resource_pool.arc_client import Frame
+from resource_pool.holds import Hold
+from resource_pool.resource_controller import RcParameters, ResourceController
 
 
 class Quiet(Behavior[BehaviorParameters]):
@@ -46,6 +48,24 @@ class Short(Quiet):
         pass
 
 
+class Misspelt(Quiet):
+    async def suspendig(self, deadline_s: float) -> None:
+        pass
+
+
+class Dangerous(ResourceController[RcParameters]):
+    async def make_save(self, hold: Hold) -> None:
+        pass
+
+
+class Spelt(Misspelt):
+    async def suspending(self, deadline_s: float) -> None:
+        pass
+
+    async def suspended_by(self) -> None:
+        pass
+
+
 class Forgetful(Quiet):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         self.count = 0
@@ -61,6 +81,7 @@ class Heir(Forgetful):
         super().__init__(launch, bus, clock)
 
 
+RENAME = "which is not overridden; write {}, or a less similar name"
 FORGOTTEN = "__init__ of Forgetful does not call super().__init__; call it first, with the same arguments"
 
 
@@ -82,6 +103,8 @@ class Read(Behavior[Speed]):
         (Unseeing, "see is an 'async def'; write it as a 'def', as the base class does"),
         (Unawaited, "act is a 'def'; write it as an 'async def', as the base class does"),
         (Short, "suspended: too many positional arguments; the base class has suspended(self, reason, by)"),
+        (Misspelt, "suspendig looks like suspending misspelt, " + RENAME.format("suspending")),
+        (Dangerous, "make_save looks like make_safe misspelt, " + RENAME.format("make_safe")),
         (Forgetful, FORGOTTEN),
         (Heir, FORGOTTEN),
         (Unread, "it has Speed in brackets and reads BehaviorParameters; write 'parameters_type = Speed' in it"),
@@ -95,7 +118,7 @@ def test_a_class_that_cannot_work_is_refused_by_check_at_its_start_and_by_swap(k
         load_class(class_path)
 
 
-@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful])
+@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful, Spelt])
 def test_a_class_that_can_work_has_no_fault(kind: type) -> None:
     assert list(class_faults(kind)) == []
 
