@@ -27,7 +27,7 @@ class ArcCommands:
         body: Role of the RC that has a body; empty: none.
 
     Raises:
-        WrongRoles: The roles are one text, or one of the others is not among them.
+        WrongRoles: The roles are one text, the commands have none, or a role of the others is not among them.
     """
 
     def __init__(
@@ -40,6 +40,8 @@ class ArcCommands:
         self._kind, self._able = kind, able
         if isinstance(roles, str):
             raise WrongRoles(f"{kind}: roles is a text; write a tuple, with a comma: ({roles!r},)")
+        if not isinstance(able, Mapping):
+            raise WrongRoles(f"{kind}: commands has no roles; write a mapping: {{Command: 'role'}}")
         named = [("body", body), *((one.__name__, role) for one in able for role in self._roles_of(one))]
         for what, role in named:
             if role and role not in roles:

@@ -37,9 +37,14 @@ class JumpingLamp(LampArc):
     commands = {Jump: "lamp"}
 
 
+class WithoutRoles(LampArc):
+    commands = (Jump,)  # type: ignore[assignment]
+
+
 @pytest.mark.parametrize(
     ("kind", "told"),
     [
+        (WithoutRoles, "WithoutRoles: commands has no roles; write a mapping: {Command: 'role'}"),
         (OneText, "OneText: roles is a text; write a tuple, with a comma: ('lamp',)"),
         (Misspelt, "Misspelt: Shine names the role 'lmap'; its roles are: lamp"),
         (OtherBody, "OtherBody: body names the role 'scout'; its roles are: lamp"),
