@@ -199,6 +199,9 @@ def host_tags_lacking(host: Element, component_type: Element) -> list[str]:
     return [tag for tag in component_type.words("tags") if tag not in host.words("tags")]
 
 
+NAMES_OF_TYPES = ("component type", "type of behavior", "type of resource", "kind of ARC")
+
+
 def is_known(element: Element, attribute: str, what: str, known: Collection[str], report: Report) -> bool:
     """Return whether the attribute names something that exists; report a legal name that does not."""
     name = element.text(attribute)
@@ -206,7 +209,9 @@ def is_known(element: Element, attribute: str, what: str, known: Collection[str]
         return True
     if is_legal(name):
         there = f"There is: {names}" if (names := listed(known)) else f"Declare a {what} of this name"
-        report.fault(element.place_of(attribute), f"no {what} is named {quoted(name)}{report.hint(name, known)}", there)
+        hint = report.hint(name, known)
+        own = "; a class of your own needs a <type> in <types>" if what in NAMES_OF_TYPES and not hint else ""
+        report.fault(element.place_of(attribute), f"no {what} is named {quoted(name)}{hint}", there + own)
     return False
 
 
