@@ -100,6 +100,7 @@ def _is_protocol(kind: type) -> bool:
 def _of_parameters(kind: type) -> Iterator[str]:
     """Yield a fault if the class in the brackets of the base class is not the one from which parameters are read."""
     taken = getattr(kind, "parameters_type", None)
+    yield from untyped_fields(taken)
     written = (base for one in kind.__mro__ for base in vars(one).get("__orig_bases__", ()))
     for base in written:
         named = [one for one in typing.get_args(base) if isinstance(one, type) and issubclass(one, msgspec.Struct)]
@@ -108,3 +109,25 @@ def _of_parameters(kind: type) -> Iterator[str]:
                 word = named[0].__name__
                 yield f"it has {word} in brackets and reads {taken.__name__}; write 'parameters_type = {word}' in it"
             return
+
+
+def untyped_fields(struct: object) -> Iterator[str]:
+    """Yield a fault for each value of a struct that is no field of it, because it has no type.
+
+    Example:
+        >>> class Turning(msgspec.Struct):
+        ...     turns = 3
+        >>> list(untyped_fields(Turning))
+        ['Turning.turns has no type, so it is no field; write turns: int = 3']
+    """
+    for one in inspect.getmro(struct) if isinstance(struct, type) else ():
+        for name, value in vars(one).items():
+            if type(value) in (bool, int, float, str) and _is_new(name, one):
+                written = f"{name}: {type(value).__name__} = {value!r}"
+                yield f"{one.__name__}.{name} has no type, so it is no field; write {written}"
+
+
+def _is_new(name: str, struct: type) -> bool:
+    """Return whether neither the struct nor a base class declares a type for this name."""
+    declared = any(name in vars(one).get("__annotations__", ()) for one in struct.__mro__)
+    return not (declared or name.startswith("_"))

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from backbone.component.abilities import Abilities
-from backbone.component.class_faults import class_faults
+from backbone.component.class_faults import class_faults, untyped_fields
 from backbone.component.component import AnyComponent, Component
 from backbone.component.field_docs import field_docs
 from backbone.component.messages import CommonQuestion
@@ -56,7 +56,7 @@ def facts_of(asked: str) -> ClassFacts:
 
 
 def _commands_fault(found: type[AnyComponent]) -> str:
-    """Return the first command that is no message, or has the name of another message to the same component."""
+    """Return the first command that is no message, has a field without a type, or the name of another message."""
     declared = getattr(found, "commands", None) or ()
     commands = declared if isinstance(declared, Collection) else kinds_of(declared)
     asked = CommonQuestion if found.accepts is None else CommonQuestion | found.accepts
@@ -66,6 +66,8 @@ def _commands_fault(found: type[AnyComponent]) -> str:
             return f"commands has {getattr(kind, '__name__', kind)}, which is no command; derive it from Command"
         if (other := schemas.setdefault(schema_of(kind), kind)) is not kind:
             return f"commands has {kind.__module__}:{kind.__name__}, and {other.__module__} has a message of this name"
+        for fault in untyped_fields(kind):
+            return fault
     return ""
 
 

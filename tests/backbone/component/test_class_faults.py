@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Coroutine, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -16,6 +16,7 @@ from backbone.mission.class_probe import facts_of
 from backbone.shipped import is_shipped
 from mission_control.behavior import Behavior, BehaviorParameters
 from resource_pool.arc_client import Frame
+from resource_pool.commands import Command
 from resource_pool.holds import Hold
 from resource_pool.resource_controller import RcParameters, ResourceController
 
@@ -89,6 +90,28 @@ class Speed(BehaviorParameters, frozen=True):
     speed_m_s: float = 0.1
 
 
+class Untyped(BehaviorParameters, frozen=True):
+    speed_m_s = 0.1
+    _unit = "m/s"
+    least_m_s: ClassVar[float] = 0.0
+
+
+class Hasty(Behavior[Untyped]):
+    parameters_type = Untyped
+
+
+class Blink(Command, frozen=True):
+    times = 3
+    moves = True
+
+
+class Blinker(ResourceController[RcParameters]):
+    commands = Blink
+
+    async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
+        return {}
+
+
 class Unread(Behavior[Speed]):
     pass
 
@@ -107,6 +130,7 @@ class Read(Behavior[Speed]):
         (Dangerous, "make_save looks like make_safe misspelt, " + RENAME.format("make_safe")),
         (Forgetful, FORGOTTEN),
         (Heir, FORGOTTEN),
+        (Hasty, "Untyped.speed_m_s has no type, so it is no field; write speed_m_s: float = 0.1"),
         (Unread, "it has Speed in brackets and reads BehaviorParameters; write 'parameters_type = Speed' in it"),
     ],
 )
@@ -116,6 +140,10 @@ def test_a_class_that_cannot_work_is_refused_by_check_at_its_start_and_by_swap(k
     assert facts_of(class_path).failure == fault
     with pytest.raises(WrongClassPath, match="Mend the class"):
         load_class(class_path)
+
+
+def test_a_command_with_a_field_without_a_type_is_refused_by_check() -> None:
+    assert facts_of(f"{__name__}:Blinker").failure == "Blink.times has no type, so it is no field; write times: int = 3"
 
 
 @pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful, Spelt])
