@@ -19,6 +19,7 @@ from backbone.dependency_database.messages import Resource
 from backbone.mission.reader import read_mission
 from resource_pool.arc_client import PathNode, claim_parameters
 from resource_pool.commands import WrongCommand
+from resource_pool.drivers.interface import UnknownDriver
 from resource_pool.messages import SwappedOut
 from ui_console.model.arc_kinds import Sight, arc_kind
 
@@ -86,6 +87,14 @@ def test_the_mission_file_of_the_guide_is_sound_and_consoles_know_what_to_draw(t
     assert (pitch.kind, pitch.unit, pitch.least, pitch.most, pitch.default) == (ValueKind.NUMBER, "Hz", 100, 4000, 440)
     assert [form.roles for form in by_name["siren_alone"].abilities.commands] == [["siren"], ["siren"]]
     assert arc_kind("siren1", Sight.PICTURES, mission.types, mission.resources) == "siren_alone"
+
+
+@pytest.mark.parametrize("wrong", ["def tone", "async def tune"])
+def test_a_driver_whose_tone_is_missing_or_not_awaited_is_refused(my_lab: Any, wrong: str) -> None:
+    _rc, driver, _arcs, _use = blocks("python")
+    exec(driver.replace("async def tone", wrong), vars(my_lab))  # noqa: S102  the guide's own text, changed in a word
+    with pytest.raises(UnknownDriver, match="tone"):
+        my_lab.Siren.driver_options(HORN)
 
 
 def test_one_person_at_a_time_sounds_it_and_it_is_silent_afterwards(local_mission: Any, my_lab: Any) -> None:
