@@ -169,7 +169,8 @@ class ResourceController(Component[R], Generic[R]):
         hold = self.admit(order.arc, order.epoch)
         self.permit(order)
         given = await self._ends.carry_out(hold, self.obey(hold, order))
-        return Applied(self.name, hold.epoch, self.clock.now_s(), order.word(), applied_values(given, order.word()))
+        values = applied_values(given, order.word(), self.obey)
+        return Applied(self.name, hold.epoch, self.clock.now_s(), order.word(), values)
 
     async def driver_exchanged(self) -> None:
         """Bring the driver to the state of this RC.

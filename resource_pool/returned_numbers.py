@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from backbone.ranges import LONGEST_MENTION, MOST_FEW, MOST_MEASURE
 from resource_pool.drivers.interface import HardwareFault
@@ -56,12 +57,12 @@ def as_declared(protocol: type, method: str, returned: object) -> object:
     return returned
 
 
-def applied_values(given: object, what: str, method: str = "obey") -> dict[str, float]:
+def applied_values(given: object, what: str, method: Callable[..., object]) -> dict[str, float]:
     """Return the values that a method of an RC returned, without numbers that are not finite, as for reports.
 
     Args:
         what: Word of the command.
-        method: The method, for people.
+        method: The method.
 
     Raises:
         TypeError: They are not numbers by name, or no message carries so many, or such long names.
@@ -72,7 +73,7 @@ def applied_values(given: object, what: str, method: str = "obey") -> dict[str, 
         numbers = None
     if numbers is None or len(numbers) > MOST_FEW:
         wanted = "return the applied values, each name with a number"
-        raise TypeError(f"{method} returned {given!r:.80} for {what}; {wanted}")
+        raise TypeError(f"{method.__module__}:{method.__qualname__} returned {given!r:.80} for {what}; {wanted}")
     return {name: number for name, number in numbers.items() if abs(number) <= MOST_MEASURE}  # not nan, see ranges
 
 

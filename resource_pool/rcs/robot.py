@@ -163,7 +163,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Also publish the applied values, with the resulting motion."""
         done = await super().command(asked)
         if isinstance(done, Applied):
-            motion = applied_values(self.motion_of(done.values), done.command, "motion_of")
+            motion = applied_values(self.motion_of(done.values), done.command, self.motion_of)
             told = msgspec.structs.replace(done, values=done.values | motion, number=self.applied)
             self.bus.publish(self.address, Conversation.MOTIONS, told)
         return done

@@ -202,9 +202,8 @@ def test_what_obey_returned_in_place_of_applied_values_is_told(local_mission: An
             with pytest.raises(NoResponder):
                 await pool.voice("one").ask("resource_pool/lights", Shine(1.0).under("one", 1), Applied, within_s=1.0)
             bug = await pool.outcome("lights")
-            assert (
-                str(bug) == f"obey returned {given!r:.80} for shine; return the applied values, each name with a number"
-            )
+            returned = f"{__name__}:SilentLamp.obey returned {given!r:.80} for shine"
+            assert str(bug) == f"{returned}; return the applied values, each name with a number"
 
     run_virtual(main())
 
