@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import msgspec
 
-from backbone.component.class_faults import class_faults
+from backbone.component.class_faults import class_faults, untyped_fields
 from mission_control.modules.ports import ModulePorts, Ports, WrongDeclaration, ports_of, type_name
 
 if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
@@ -142,7 +142,7 @@ def _check_update(kind: type[Module]) -> None:
             f"update of {type_name(kind)}{wrong}",
             remedy="Write it as 'def update(self, inputs)'; it returns the outputs.",
         )
-    for fault in class_faults(kind):
+    for fault in (*class_faults(kind), *untyped_fields(kind.Parameters), *untyped_fields(kind.State)):
         raise WrongDeclaration(f"{type_name(kind)}: {fault}", remedy="Mend the class.")
 
 

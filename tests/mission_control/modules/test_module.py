@@ -103,9 +103,21 @@ class NeverReady(Bare):
         return True
 
 
+class UntypedParameter(Bare):
+    class Parameters(Module.Parameters, frozen=True):
+        weight = 0.25
+
+
+class UntypedState(Bare):
+    class State(Module.State):
+        height_m = 0.0
+
+
 @pytest.mark.parametrize(
     ("kind", "word"),
     [
+        (UntypedParameter, "Parameters.weight has no type, so it is no field; write weight: float = 0.25"),
+        (UntypedState, "State.height_m has no type, so it is no field; write height_m: float = 0.0"),
         (Undeclared, "update of .*:Undeclared is not declared"),
         (Awaiting, "update of .*:Awaiting is an async function"),
         (ByPort, "update of .*:ByPort: missing a required argument: 'right'"),
