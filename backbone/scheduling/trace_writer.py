@@ -71,6 +71,7 @@ class TraceWriter:
         self._is_up[rc.name] = True
         self.record(
             "rc",
+            f"its ARCs share {rc.capacity:.0%} of its time" if rc.sharable else "its ARCs hold it in turn",
             id=rc.name,
             kind="share" if rc.sharable else "unit",
             cap=rc.capacity,
@@ -102,7 +103,8 @@ class TraceWriter:
             self._nodes[way] = (parent, number)
             if told == (parent, number) or (told is None and name.startswith(CONSOLE)):
                 continue  # the request's line has a console's first number
-            cause = "its parent" if told is not None and told[0] != parent else "its number among its siblings"
+            moved = told is not None and told[0] != parent
+            cause = f"its parent is {parent}" if moved else f"its priority among its siblings is {number}"
             self.record("node", cause, id=self._id(way), parent=parent, prio=number)
 
     def forget_nodes(self, ways: Iterable[tuple[str, ...]]) -> None:

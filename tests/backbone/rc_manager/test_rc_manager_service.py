@@ -99,6 +99,19 @@ def test_a_console_of_higher_priority_overrides_at_once_and_the_behavior_comes_b
     run_virtual(main())
 
 
+def test_the_story_of_a_resource_and_of_a_behavior_begins_with_words_for_people(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()) as manager:
+            one = await here.arc("one")
+            await one.ask_for(request("one", "left", "radio"))
+            told = {name: [event.what for event in manager.story.of(name)] for name in ("left", "radio", "local")}
+            assert "rc: its ARCs hold it in turn" in told["left"]
+            assert "rc: its ARCs share 100% of its time" in told["radio"]
+            assert "node: its priority among its siblings is 10" in told["local"]
+
+    run_virtual(main())
+
+
 def test_impossible_requests_are_refused_with_their_numbers(pool: Any) -> None:
     async def main() -> None:
         async with pool() as here, here.beside(here.manager()):
