@@ -34,7 +34,7 @@ async def print_story(where: Where, name: str, *, as_json: bool) -> ExitCode:
     events = [*map(found.people.named_event, found.events)]
     show([json.dumps(story_json(name, found.events, found.missing))] if as_json else story_lines(events))
     if not found.events:
-        say(f"no component has an event about {name}")
+        say(f"no component has an event about {name}{found.similar}")
     if found.missing:
         say(f"incomplete: {counted(len(found.missing), 'component')} did not answer")
         for missing in found.missing:

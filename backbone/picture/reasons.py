@@ -17,7 +17,7 @@ from backbone.mission_log.lines import event_json
 from backbone.mission_log.log import AskPeople, PeopleKnown
 from backbone.mission_log.people import People, screens_of
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.naming import component_of
+from backbone.naming import component_of, did_you_mean
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
 from backbone.picture.words import RULES, absence_line, stop_line
@@ -213,11 +213,13 @@ class FoundEvents:
         events: In the order of their times.
         missing: Components that did not answer, with reasons: the events are incomplete.
         people: Present and past persons at the consoles of the events.
+        similar: Remark with the most similar name of a component, if the name is none; empty: no name is similar.
     """
 
     events: Sequence[StoryEvent]
     missing: Sequence[str] = ()
     people: People = field(default_factory=People)
+    similar: str = ""
 
 
 async def story_of(bus: Bus, text: str, clock: Clock) -> FoundEvents:
@@ -244,7 +246,9 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> FoundEvents:
     missing += [f"{each.name}: it is absent, {each.cause}" for each in absent]
     if not listing.complete:
         missing.append("the nameserver has just started: components may be missing in its list")
-    return printable_all(FoundEvents(sorted(events, key=lambda event: event.at_s), missing, picture.people))
+    names = {component_of(component.address) for component in listing.components}
+    similar = "" if asked.name in names else did_you_mean(asked.name, names)
+    return printable_all(FoundEvents(sorted(events, key=lambda event: event.at_s), missing, picture.people, similar))
 
 
 async def _seen(bus: Bus, clock: Clock) -> MissionPicture:

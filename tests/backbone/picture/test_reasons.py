@@ -105,6 +105,13 @@ def test_a_story_names_every_component_that_did_not_tell_its_part(text: str) -> 
         assert name in missing
 
 
+@pytest.mark.parametrize(
+    ("text", "similar"), [("scuot1", " (did you mean 'scout1'?)"), ("scout1", ""), ("anvil", ""), ("", "")]
+)
+def test_a_story_of_a_misspelt_name_names_a_similar_component(text: str, similar: str) -> None:
+    assert story(text).similar == similar
+
+
 def test_a_cause_has_the_events_that_it_led_to_and_no_others() -> None:
     assert story(CAUSE).events == EVENTS[:1]
     reasons = why(CAUSE)
