@@ -36,7 +36,7 @@ Connect = Annotated[
     str | None, typer.Option("--connect", callback=hub_endpoint, help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")
 ]
 User = Annotated[
-    str, typer.Option("--user", callback=shown_name, help="Who you are, for the record; default: who is logged in.")
+    str, typer.Option("--user", callback=shown_name, help="Your name in the log; default: the logged-in user.")
 ]
 
 Robot = Annotated[
@@ -47,7 +47,7 @@ Robot = Annotated[
         help="Robot to take over; none: any free one with a camera.",
     ),
 ]
-Priority = Annotated[int, _priority(help="Beside the mission's own; larger is higher.")]
+Priority = Annotated[int, _priority(help="Compared with the priority of the mission; larger is higher.")]
 ProfileName = Annotated[Profile, typer.Option(help="How the console looks.")]
 Script = Annotated[str, typer.Option(help="Drive by the JSON lines of this file, '-' for standard input.")]
 ScriptAsJson = Annotated[bool, typer.Option("--json", help="JSON lines, no screen; implies --script -.")]
@@ -72,10 +72,10 @@ Save = Annotated[
 LooksFor = Annotated[float, _seconds("--for", help="End after so many seconds; 0: at Ctrl-C.")]
 
 Host = Annotated[
-    str, typer.Option(help="Address to listen at; beyond this machine only if you say so, 0.0.0.0 is all.")
+    str, typer.Option(help="Address to listen at: this machine only, unless you set another; 0.0.0.0: all.")
 ]
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any that is free.")]
-HighestPriority = Annotated[int, _priority(help="The most an operator may ask for, beside the mission's own.")]
+HighestPriority = Annotated[int, _priority(help="Highest priority of an operator, compared with that of the mission.")]
 OperatorPriorities = Annotated[
     list[str] | None,
     typer.Option(help="NAME=PRIORITY: a token for this operator alone; again for each. Default: one for all."),

@@ -205,7 +205,7 @@ def components(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Show the component types of the mission: class, needs, how many may run and do; with --type the abilities."""
+    """Show the component types of the mission: class, needs, numbers allowed and running; with --type the abilities."""
     from backbone.command_line.inventory import print_types
 
     where = chosen(mission, connect, secret_file)
@@ -337,7 +337,7 @@ def down(
     now: Annotated[bool, typer.Option("--now", help="Without the last branch; a second 'down' ends it, too.")] = False,
     mission: MissionName = None,
 ) -> None:
-    """Stop a mission of this machine: its last branch, then all; ask, SIGTERM, then SIGKILL; prints what helped."""
+    """Stop a mission of this machine: its last branch, then all; ask, SIGTERM, then SIGKILL; print which was needed."""
     from backbone.launcher.detached import take_down
 
     run(lambda: take_down(mission, at_once=now))
@@ -381,7 +381,7 @@ def simulate(
 
 @app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
 def experiment(context: typer.Context) -> None:
-    """Run the papers' experiments on simulated robots: 'surveillance', 'load'; see 'experiment --help'."""
+    """Run experiments on simulated robots, among them those of the papers; see 'experiment --help'."""
     import_module(EXPERIMENTS).run(context.args)
 
 

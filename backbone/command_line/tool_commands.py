@@ -43,7 +43,7 @@ def metrics(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Serve numbers of the schedule to Prometheus: who held and waited for what, switches, drops; until Ctrl-C."""
+    """Serve metrics to Prometheus: holding and waiting times of resources, switches, drops; until Ctrl-C."""
     with needing_extras():
         from backbone.command_line.metrics_work import serve_metrics
     where = chosen(mission, connect, secret_file)

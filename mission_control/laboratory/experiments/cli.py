@@ -15,12 +15,13 @@ from backbone.command_line.unusable_file import FileUnusable
 from backbone.errors import Refusal, code_of
 from backbone.launcher.endings import ExitCode
 
+SHARE_DRIVEN = "Share of the time in which consoles are driven."
 app = typer.Typer(
     cls=CommandTable,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
-    help="Run the papers' experiments on simulated robots, many trials, faster than real time, from a seed.",
+    help="Run experiments on simulated robots, among them those of the papers: many trials, faster than real time.",
 )
 
 MOST_TRIALS = 1_000_000  # chosen: days of work
@@ -74,7 +75,7 @@ def surveillance(
     speed: Annotated[list[float] | None, typer.Option("--speed", help="Of the target, m/s; repeatable.")] = None,
     slice_s: Annotated[float | None, typer.Option("--slice", help="Minimum run time of all, seconds.")] = None,
     order: Annotated[TurnOrder | None, typer.Option("--order", help="Whose turns come first.")] = None,
-    driven: Annotated[float | None, typer.Option("--driven", help="Share of the time consoles are driven.")] = None,
+    driven: Annotated[float | None, typer.Option("--driven", help=SHARE_DRIVEN)] = None,
     noise: Annotated[float | None, typer.Option("--noise", help="Of the pictures: 0 none, 1 as in the papers.")] = None,
     frames: Annotated[int | None, typer.Option("--frames", help="Certain pictures a watcher wants.")] = None,
     trials: Trials = 200,
@@ -125,9 +126,9 @@ def surveillance(
 
 @app.command()
 def load(
-    policy: Annotated[Policy, typer.Option("--policy", help="How to ask.")] = Policy.PAPER,
+    policy: Annotated[Policy, typer.Option("--policy", help="Policy of the requests.")] = Policy.PAPER,
     channels: Annotated[int, typer.Option("--channels", min=1, max=4, help="Video frequencies.")] = 1,
-    driven: Annotated[float, typer.Option("--driven", min=0.0, max=1.0, help="Share of time")] = 1.0,
+    driven: Annotated[float, typer.Option("--driven", min=0.0, max=1.0, help=SHARE_DRIVEN)] = 1.0,
     trials: Trials = 100,
     seed: Seed = 1,
     jobs: Jobs = 0,

@@ -22,7 +22,7 @@ def surveillance(*words: str) -> Result:
     return typed("surveillance", "--jobs", "1", *words)
 
 
-@pytest.mark.parametrize("words", [["--help"], ["surveillance", "--help"], ["load", "--help"]])
+@pytest.mark.parametrize("words", [["--help"], ["surveillance", "--help"], ["load", "--help"], ["servoing", "--help"]])
 def test_help_names_what_there_is(words: Sequence[str]) -> None:
     told = typed(*words)
     assert told.exit_code == 0
