@@ -14,6 +14,8 @@ from collections.abc import Iterator
 
 import msgspec
 
+LEAST_LETTERS = 6  # chosen: shorter words often differ in a letter, as act and fact, see and seek
+
 
 def class_faults(kind: type) -> Iterator[str]:
     """Yield a sentence, with the remedy, for each fault.
@@ -66,17 +68,22 @@ def _can_be_awaited(function: typing.Any) -> bool:
 
 
 def _of_names(kind: type) -> Iterator[str]:
-    """Yield a fault for each new method whose name is one letter off a method that no derived class overrides."""
+    """Yield a fault for each new method whose name looks like that of a method that no derived class overrides."""
     methods = [name for name in dir(kind) if name[0] != "_" and inspect.isfunction(getattr(kind, name))]
     makers = {name: [one for one in kind.__mro__ if name in vars(one)] for name in methods}
     for own, base in itertools.permutations([name for name in methods if len(makers[name]) == 1], 2):
         maker, meant = makers[own][0], makers[base][0]
-        if maker is not meant and issubclass(maker, meant) and _is_one_letter_off(own, base):
+        if maker is not meant and issubclass(maker, meant) and _is_misspelt(own, base):
             yield f"{own} looks like {base} misspelt, which is not overridden; write {base}, or a less similar name"
 
 
-def _is_one_letter_off(name: str, other: str) -> bool:
-    """Return whether one letter is wrong, missing, too many, or in another place."""
+def _is_misspelt(name: str, other: str) -> bool:
+    """Return whether one letter of a long name is wrong, missing, too many, or in another place.
+
+    The last letter must be right: ``resume`` is another word than ``resumed``.
+    """
+    if len(other) < LEAST_LETTERS or name[-1] != other[-1]:
+        return False
     return not {name, *_without_a_letter(name)}.isdisjoint({other, *_without_a_letter(other)})
 
 

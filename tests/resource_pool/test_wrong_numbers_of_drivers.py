@@ -126,7 +126,11 @@ def test_a_motion_that_is_no_number_is_not_published(
 def test_a_motion_of_wrong_form_ends_the_rc_with_the_name_of_the_method(
     local_mission: Any, monkeypatch: pytest.MonkeyPatch, wrong: Any
 ) -> None:
-    monkeypatch.setattr(WrongMotion, "motion_of", lambda _self, _values: wrong)
+    def motion_of(_self: WrongMotion, _values: Any) -> Any:
+        return wrong
+
+    motion_of.__qualname__ = "WrongMotion.motion_of"
+    monkeypatch.setattr(WrongMotion, "motion_of", motion_of)
 
     async def main() -> None:
         async with a_pool(local_mission, ["radio"], manager=False, rc_classes={"scout": WrongMotion}) as pool:
@@ -136,6 +140,6 @@ def test_a_motion_of_wrong_form_ends_the_rc_with_the_name_of_the_method(
                 await command(pool, "one", 1, Drive(4.0, 4.0))
             bug = await pool.outcome("scout1")
             assert isinstance(bug, TypeError)
-            assert str(bug).startswith("motion_of returned")
+            assert str(bug).startswith(f"{__name__}:WrongMotion.motion_of returned")
 
     run_virtual(main())

@@ -54,6 +54,19 @@ class Misspelt(Quiet):
         pass
 
 
+class Similar(Quiet):
+    """Its names are other words than the hooks."""
+
+    def seek(self) -> None:
+        pass
+
+    def fact(self) -> None:
+        pass
+
+    def resume(self) -> None:
+        pass
+
+
 class Dangerous(ResourceController[RcParameters]):
     async def make_save(self, hold: Hold) -> None:
         pass
@@ -146,7 +159,7 @@ def test_a_command_with_a_field_without_a_type_is_refused_by_check() -> None:
     assert facts_of(f"{__name__}:Blinker").failure == "Blink.times has no type, so it is no field; write times: int = 3"
 
 
-@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful, Spelt])
+@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful, Spelt, Similar])
 def test_a_class_that_can_work_has_no_fault(kind: type) -> None:
     assert list(class_faults(kind)) == []
 
