@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 EV_SYN, EV_KEY, EV_ABS = 0, 1, 3  # Linux, input-event-codes.h
 SYN_DROPPED = 3
 ABS_X, ABS_Y, ABS_HAT0X, ABS_HAT0Y = 0, 1, 16, 17
-BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_TL, BTN_TR, BTN_SELECT, BTN_START = 304, 305, 307, 310, 311, 314, 315
+BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_WEST, BTN_TL, BTN_TR, BTN_SELECT, BTN_START = 304, 305, 307, 308, 310, 311, 314, 315
 DEAD_MAN = frozenset({BTN_TL, BTN_TR})
 STILL_ZONE = 0.12  # chosen: released sticks rest within a tenth of their middle
 SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``; machine seconds
@@ -53,7 +53,8 @@ BUTTONS = {
     BTN_START: PadWish.TAKE,
     BTN_SELECT: PadWish.RELEASE,
     BTN_EAST: PadWish.STOP_ROBOT,
-    BTN_NORTH: PadWish.STOP_ALL,
+    BTN_NORTH: PadWish.STOP_ALL,  # both, because drivers do not agree which of them is the X and which the upper one
+    BTN_WEST: PadWish.STOP_ALL,
 }
 CROSS = {
     (ABS_HAT0X, 1): PadWish.NEXT_ROBOT,
@@ -196,7 +197,8 @@ async def play_gamepad(
 
 def buttons_help() -> list[str]:
     """Return the actions of the gamepad's buttons, for people."""
-    names: dict[int, str] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
+    names: dict[int, str] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_WEST: "Y"}
+    names |= {BTN_SELECT: "select", BTN_START: "start"}
     return [
         "shoulder button held: the left stick drives",
         *(f"{names[code]}: {wish}" for code, wish in BUTTONS.items()),

@@ -7,7 +7,7 @@ import { DRIVES } from "./keys.js";
 const SAY_EVERY_MS = 50; // chosen: six times within the 300 ms after which the server stops the wheels
 const SHOULDERS = [4, 5]; // Gamepad API, standard mapping
 /** @type {Record<string, string>} */
-const BUTTONS = { 0: "jump", 1: "stop_mine", 3: "stop_all", 8: "release", 9: "take" }; // as in the terminal
+const BUTTONS = { 0: "jump", 1: "stop_mine", 2: "stop_all", 3: "stop_all", 8: "release", 9: "take" }; // of gamepad.py
 const DEAD_ZONE = 0.12; // chosen: worn sticks rest within this range
 
 /**

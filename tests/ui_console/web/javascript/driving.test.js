@@ -62,3 +62,14 @@ test("when a gamepad is unplugged, what is held on another one has to be let go 
   pad.feel(device([SHOULDER], undefined, 1));
   assert.notEqual(pad.stick, null);
 });
+
+for (const number of [2, 3]) {
+  test(`button ${number} stops all robots, because drivers and makers swap the names of these two`, () => {
+    /** @type {string[]} */
+    const did = [];
+    const pad = new Gamepad((what) => did.push(what));
+    pad.feel(device([]));
+    pad.feel(device([number]));
+    assert.deepEqual(did, ["stop_all"]);
+  });
+}
