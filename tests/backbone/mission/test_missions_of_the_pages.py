@@ -6,13 +6,15 @@ import re
 import textwrap
 from pathlib import Path
 
-from mission_files import MISSION_XML, read_text
+import pytest
+from mission_files import MISSION_XML, faults_in, read_text
 
 DOCS = MISSION_XML.parent / "docs"
 MISSION = MISSION_XML.read_text()
 HOSTS = re.compile(r"<hosts>.*?</hosts>", re.DOTALL)
 WORLD = re.compile(r"<world.*?</world>", re.DOTALL)
 OTHER_SCOUTS = re.compile(r'<resource type="scout" name="scout2".*name="scout3".*?</resource>', re.DOTALL)
+RADIO = re.compile('<resource type="command_radio".*/>')
 BEHAVIORS = re.compile(r"<behaviors>.*?</behaviors>", re.DOTALL)
 ONE_SCOUT = OTHER_SCOUTS.sub("", BEHAVIORS.sub("", MISSION))
 
@@ -66,3 +68,32 @@ def test_the_behavior_of_the_page_is_a_type_and_a_node(tmp_path: Path) -> None:
         "<resources>", f"<types>{kind}</types><resources>"
     )
     assert [node.name for node in read_text(tmp_path, own).behaviors][-1] == "turner"
+
+
+METHODS = """
+    async def open(self) -> None: ...
+    async def close(self) -> None: ...
+    async def transmit(self, *packet, **more): ...
+"""
+
+
+def test_the_serial_radio_of_the_page_has_the_options_of_its_resource(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (DOCS / "how-to" / "write-a-driver.md").read_text()
+    [driver] = re.findall(r"^ *```python\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE)
+    imports = "import msgspec\nfrom resource_pool.drivers.interface import DriverSite\n"
+    (tmp_path / "my_robots").mkdir()
+    (tmp_path / "my_robots" / "__init__.py").touch()
+    (tmp_path / "my_robots" / "radio.py").write_text(imports + textwrap.dedent(driver) + METHODS)
+    monkeypatch.syspath_prepend(tmp_path)
+    radio, _lamp, _arc = parts_of("write-a-driver.md")
+    read_text(tmp_path, put(RADIO, radio))
+    [fault] = faults_in(tmp_path, put(RADIO, radio.replace('name="port"', 'name="prot"')))
+    assert "prot" in fault.message
+
+
+def test_the_lamp_of_the_page_and_its_arc_are_types_and_a_resource(tmp_path: Path) -> None:
+    _radio, lamp, arc = parts_of("write-a-driver.md")
+    kind, resource = lamp.split("…\n")
+    read_text(tmp_path, put(re.compile("<resources>"), f"<types>{kind}{arc}</types><resources>{resource}"))
