@@ -89,8 +89,9 @@ def test_the_serial_radio_of_the_page_has_the_options_of_its_resource(
     monkeypatch.syspath_prepend(tmp_path)
     radio, _lamp, _arc = parts_of("write-a-driver.md")
     read_text(tmp_path, put(RADIO, radio))
-    [fault] = faults_in(tmp_path, put(RADIO, radio.replace('name="port"', 'name="prot"')))
-    assert "prot" in fault.message
+    missing, unknown = faults_in(tmp_path, put(RADIO, radio.replace('name="port"', 'name="prot"')))
+    assert "lacks parameter port" in missing.message
+    assert "no parameter 'prot'" in unknown.message
 
 
 def test_the_lamp_of_the_page_and_its_arc_are_types_and_a_resource(tmp_path: Path) -> None:
