@@ -249,21 +249,21 @@ def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
     Args:
         messages: In the order of sending.
     """
-    lives: dict[str, list[_Life]] = {}
+    lives: dict[str, list[_SenderLife]] = {}
     began_s = math.inf
     for message in messages:
         began_s = min(began_s, message.heard_s)
         if message.source:
             own = lives.setdefault(message.source, [])
             if not own or own[-1].is_over(message):
-                own.append(_Life())
+                own.append(_SenderLife())
             own[-1].take(message, began_s)
     missing = {source: sum(life.gaps(began_s) for life in own) for source, own in sorted(lives.items())}
     return {source: count for source, count in missing.items() if count}
 
 
 @dataclass(slots=True)
-class _Life:
+class _SenderLife:
     """The message numbers of one life of a sender; it takes the same memory however many they are.
 
     Attributes:
