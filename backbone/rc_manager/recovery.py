@@ -94,6 +94,13 @@ class Found:
         return sorted(found, key=lambda one: one[0])
 
 
+def has_its_rcs(current: CurrentRequest, known: Collection[str]) -> bool:
+    """Return whether the RCs that were chosen for the request are all known, and one of its alternatives."""
+    chosen = {*current.rcs}
+    is_whole = bool(chosen) and chosen.issubset(known)
+    return is_whole and any(wish.keys() == chosen for wish in current.request.alternatives)
+
+
 def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
     """Return the event that introduces an RC.
 

@@ -52,7 +52,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.rc_manager.parameters import RcManagerParameters
 from backbone.rc_manager.rc_watch import RcWatch
-from backbone.rc_manager.recovery import Found, Recovery, rc_known
+from backbone.rc_manager.recovery import Found, Recovery, has_its_rcs, rc_known
 from backbone.scheduling.events import (
     CapacityChanged,
     ConnectArc,
@@ -223,16 +223,13 @@ class RcManager(Component[RcManagerParameters]):
 
     def admit_again(self, current: CurrentRequest) -> bool:
         """Admit a request with the RCs chosen for it before, unless one is gone or they are no alternative."""
-        chosen = {*current.rcs}
-        is_whole = bool(chosen) and self._resources.keys() >= chosen
-        is_right = is_whole and any(wish.keys() == chosen for wish in current.request.alternatives)
-        if is_right:
+        if is_right := has_its_rcs(current, self._resources):
             self._admit(current.request, tuple(current.rcs))
         return is_right
 
-    def _admit(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
+    def _admit(self, request: SchedulingRequest, rcs: tuple[str, ...], *, others_follow: bool = False) -> None:
         self._arcs.remember(request.arc)
-        self.happened(Requested(request, rcs))
+        self.happened(Requested(request, rcs, others_follow))
         arc = self.manager.master_schedule.state.arcs.get(request.arc)
         if arc is not None and arc.request.path == request.path:  # else its last request is still being ended
             path = self.manager.tree.nodes(arc.place_in_tree)
@@ -293,8 +290,9 @@ class RcManager(Component[RcManagerParameters]):
                 self.happened(Extended(arc, until_s))
             if event.request.idle:  # it sent that while no RC manager answered
                 self.happened(Idled(arc))
-        for current in found.waiting():
-            self.admit_again(current)
+        waiting = [current for current in found.waiting() if has_its_rcs(current, self._resources)]
+        for number, current in enumerate(waiting, 1):  # an adopted slice that is over ends behind all of them
+            self._admit(current.request, tuple(current.rcs), others_follow=number < len(waiting))
         for state in found.rcs.values():
             self._heard_of_packets(state)
 

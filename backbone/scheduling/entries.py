@@ -30,11 +30,13 @@ class OpenDecision:
         now_s: Its time; it never decreases from one decision to the next.
         instructions: The instructions for the loop so far, in their order.
         ended: ARCs whose slices it ended for an equal, each with a sharable RC that both use.
+        is_put_off: True: requests that are as old follow, and nothing is decided before.
     """
 
     now_s: float = 0.0
     instructions: list[Instruction] = field(default_factory=list)
     ended: list[tuple[ArcEntry, str]] = field(default_factory=list)
+    is_put_off: bool = False
 
 
 @dataclass(slots=True)

@@ -84,10 +84,15 @@ class PacketsMeasured(Message, frozen=True):
 
 
 class Requested(Message, frozen=True):
-    """An ARC sent a request; the set of RCs is already chosen (``choose`` in the schedule manager)."""
+    """An ARC sent a request; the set of RCs is already chosen (``choose`` in the schedule manager).
+
+    Attributes:
+        others_follow: True: requests that are as old follow, so a decision must wait for the last of them.
+    """
 
     request: SchedulingRequest
     rcs: Annotated[tuple[Mention, ...], FEW]
+    others_follow: bool = False
 
 
 class Adopted(Message, frozen=True):

@@ -144,6 +144,9 @@ class ScheduleManager:
         decision = self._decision
         decision.now_s, decision.instructions, decision.ended = max(now_s, decision.now_s), [], []
         self._apply(event)
+        decision.is_put_off = isinstance(event, Requested) and event.others_follow
+        if decision.is_put_off:
+            return decision.instructions
         if self._arcs.retrying:
             self._arcs.retry()
         self._ends.check(decision.now_s)
@@ -254,11 +257,13 @@ class ScheduleManager:
         return [self._transitions.opening_line()]
 
     def check(self) -> None:
-        """Return if the invariants of the schedule hold, else raise.
+        """Return if the invariants of the schedule hold, or its decision waits for further requests, else raise.
 
         Raises:
             AssertionError: An invariant is broken; with the story of the ARCs concerned.
         """
+        if self._decision.is_put_off:
+            return
         for invariant, whom in broken(self.master_schedule, self._decision.now_s):
             story = self._trace.story_of({arc.name for arc in whom})
             raise AssertionError("\n".join([f"broken at {self._decision.now_s}: {invariant}", *map(str, story)]))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from rc_manager_at_work import Pool, request
 from trace_checker import check, read_lines
@@ -23,6 +23,7 @@ moments = st.lists(
 )
 
 
+@example(deaths=[(SLICE_S + SETTLE_S, 0.05), (6.9, 0.0)], names=["a", "b", "c"])  # a slice was over meanwhile
 @given(deaths=moments, names=st.permutations(["a", "b", "c"]))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_equals_take_turns_however_often_the_rc_manager_dies(
