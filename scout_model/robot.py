@@ -7,6 +7,7 @@ a new kind needs no change in this package.
 from __future__ import annotations
 
 import importlib
+import inspect
 import re
 from collections.abc import Mapping, Sequence
 from typing import Protocol, cast, runtime_checkable
@@ -81,7 +82,7 @@ def robot_class(kind: str) -> type[Robot]:
         kind: Class path ``package.module:Class``.
 
     Raises:
-        InvalidWorld: There is no such class, or it does not have the methods of ``Robot``.
+        InvalidWorld: There is no such class, it lacks a method of ``Robot``, or has one as an ``async def``.
     """
     if not _CLASS_PATH.fullmatch(kind):
         raise InvalidWorld(f"{kind!r} is no class path; write package.module:Class")
@@ -93,6 +94,9 @@ def robot_class(kind: str) -> type[Robot]:
     lacking = [part for part in _PARTS if not hasattr(found, part)]
     if not isinstance(found, type) or lacking:
         raise InvalidWorld(f"{kind} is no kind of robot: it lacks {', '.join(lacking) or 'a class'}")
+    for part in _PARTS:
+        if inspect.iscoroutinefunction(getattr(found, part)):
+            raise InvalidWorld(f"{kind} is no kind of robot: {part} is an 'async def'; write it as a 'def'")
     return found
 
 

@@ -39,6 +39,16 @@ def test_the_scout_is_one_kind_among_others() -> None:
     assert isinstance(Scout(), Robot)
 
 
+class Unheard(Scout):
+    async def hear(self, payload: bytes, now_s: float) -> None:  # type: ignore[override]
+        pass
+
+
+def test_a_robot_whose_methods_would_not_be_awaited_is_refused() -> None:
+    with pytest.raises(InvalidWorld, match="Unheard is no kind of robot: hear is an 'async def'; write it as a 'def'"):
+        robot_class(f"{__name__}:Unheard")
+
+
 def test_a_rover_hears_its_packets_drives_and_stops_beside_scouts() -> None:
     room = world()
     for frame in range(60):
