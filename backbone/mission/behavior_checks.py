@@ -98,7 +98,15 @@ def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
 def _check_needed(behavior: Element, needed: str, tables: Tables, report: Report) -> None:
     """Report a behavior without the ARC, or without the pictures, that its class needs."""
     arc, like = behavior.first("arc"), tables.facts_of(needed)
-    if needed and arc is None:
+    kinds = [name for name in tables.types if tables.needs(name)]
+    if needed not in ("", ANY_ARC, *kinds):
+        report.fault(
+            behavior.place_of("type"),
+            f"the class of {behavior.text('type')} needs an ARC of kind {needed!r}, and there is none"
+            f"{report.hint(needed, kinds)}",
+            f"Write one of these as needs_arc in the class: {listed(kinds)}",
+        )
+    elif needed and arc is None:
         report.fault(
             behavior.place,
             f"{behavior.text('type')} {behavior.text('name')} has no ARC, and needs one",

@@ -102,6 +102,18 @@ def test_a_class_of_ones_own_that_acts_needs_an_arc_unless_it_says_otherwise(
     assert 'kind="…"' in fault.remedy
 
 
+class Misspelling(Bellringer):
+    needs_arc = "driv"
+
+
+def test_a_kind_of_arc_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    own = f'<types><type name="bell" class="{__name__}:Misspelling" subsystem="mission_control"/></types><resources>'
+    node = f'<behavior type="bell" name="ring" priority="1">{ARC}</behavior></behaviors>'
+    text = MISSION.replace("<resources>", own).replace("</behaviors>", node)
+    [fault] = faults_in(tmp_path, text)
+    assert fault.message == ("the class of bell needs an ARC of kind 'driv', and there is none (did you mean 'drive'?)")
+
+
 def test_a_class_of_ones_own_that_sees_needs_pictures_unless_it_says_otherwise() -> None:
     assert facts_of(f"{__name__}:Watcher").needs_arc == "capture"
     assert facts_of(f"{__name__}:LooksSometimes").needs_arc == ""
