@@ -135,6 +135,6 @@ def untyped_fields(struct: object) -> Iterator[str]:
 
 
 def _is_new(name: str, struct: type) -> bool:
-    """Return whether neither the struct nor a base class declares a type for this name."""
+    """Return whether neither the struct nor a base class declares a type for this name, and it is no constant."""
     declared = any(name in vars(one).get("__annotations__", ()) for one in struct.__mro__)
-    return not (declared or name.startswith("_"))
+    return not (declared or name.startswith("_") or name.isupper())

@@ -106,6 +106,7 @@ class Speed(BehaviorParameters, frozen=True):
 class Untyped(BehaviorParameters, frozen=True):
     speed_m_s = 0.1
     _unit = "m/s"
+    MOST_M_S = 0.5
     least_m_s: ClassVar[float] = 0.0
 
 
