@@ -76,14 +76,14 @@ class Give(Driver[GiveParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._held_s, self._since_s = 0.0, math.inf
+        self._held_s, self._in_force_since_s = 0.0, math.inf
         self._command = self._read()
         self._holding: asyncio.Task[None] | None = None
 
     @property
     def held_s(self) -> float:
         """Time for which the command was in force, over all grants; settable."""
-        return self._held_s + max(0.0, self.clock.now_s() - self._since_s)
+        return self._held_s + max(0.0, self.clock.now_s() - self._in_force_since_s)
 
     @held_s.setter
     def held_s(self, held_s: float) -> None:
@@ -105,13 +105,13 @@ class Give(Driver[GiveParameters]):
             wanted = self.parameters
             self.report(f"gives {wanted.word}{f' to {robot}' if robot else ''}")
             left_s = max(0.0, wanted.for_s - self.held_s)
-            self._since_s, lasts_s = self.clock.now_s(), min(left_s, wanted.again_s or left_s)
+            self._in_force_since_s, lasts_s = self.clock.now_s(), min(left_s, wanted.again_s or left_s)
             self._holding = self.start_task(self.clock.sleep_s(lasts_s), "hold")
             try:
                 await asyncio.wait([self._holding])
             finally:
                 self._holding.cancel()
-                self._held_s, self._since_s = self.held_s, math.inf
+                self._held_s, self._in_force_since_s = self.held_s, math.inf
             if command == self._command and self.held_s >= self.parameters.for_s - TICK_S:
                 self.finish(BehaviorStatus.SUCCESS)
                 return
