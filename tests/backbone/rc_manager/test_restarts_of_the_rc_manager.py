@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import rc_manager_at_work
 from msgspec.structs import replace
-from rc_manager_at_work import HARDWARE, request
+from rc_manager_at_work import HARDWARE, Pool, request
 from trace_checker import check
 
 from backbone.bus.clock import run_virtual
@@ -25,20 +25,10 @@ def test_an_adopted_arc_that_no_longer_fits_is_revoked_at_once(pool: Any) -> Non
                 await one.ask_for(request("one", "left", "radio"))
                 await two.ask_for(request("two", "right", "radio"))
                 await here.clock.sleep_s(1.0)
-            here.rcs["radio"].tells = lambda state: replace(state, capacity=0.05)
-            async with here.beside(here.manager()):
-                await here.clock.sleep_s(0.1)
-                assert (one.is_open, two.is_open) == (True, False)
-                assert {*here.rcs["radio"].holders} == {"one"}
-                assert not here.rcs["right"].holders
-                await here.clock.sleep_s(6.0)
-                assert two.is_open, "it gets its turn"
+            await _restart_with_little_capacity(here, one, two)
             return here.trace
 
-    lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
-    lines = lines[[line["ev"] for line in lines].index("meta", 1) :]
-    assert next(line["why"] for line in lines if line["ev"] == "revoke") == "capacity"
-    assert check(lines) == []
+    _require_a_revocation_for_capacity(run_virtual(main()))
 
 
 def test_an_adopted_arc_is_revoked_at_once_if_the_capacity_was_raised_before_and_lowered_since(
@@ -57,17 +47,26 @@ def test_an_adopted_arc_is_revoked_at_once_if_the_capacity_was_raised_before_and
                 await here.clock.sleep_s(1.0)
                 assert one.is_open
                 assert two.is_open
-            here.rcs["radio"].tells = lambda state: replace(state, capacity=0.05)
-            async with here.beside(here.manager()):
-                await here.clock.sleep_s(0.1)
-                assert (one.is_open, two.is_open) == (True, False)
-                assert {*here.rcs["radio"].holders} == {"one"}
-                assert not here.rcs["right"].holders
-                await here.clock.sleep_s(6.0)
-                assert two.is_open, "it gets its turn"
+            await _restart_with_little_capacity(here, one, two)
             return here.trace
 
-    lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
+    _require_a_revocation_for_capacity(run_virtual(main()))
+
+
+async def _restart_with_little_capacity(here: Pool, one: Any, two: Any) -> None:
+    """Lower the radio's capacity while no RC manager runs: the next one revokes the second ARC at once."""
+    here.rcs["radio"].tells = lambda state: replace(state, capacity=0.05)
+    async with here.beside(here.manager()):
+        await here.clock.sleep_s(0.1)
+        assert (one.is_open, two.is_open) == (True, False)
+        assert {*here.rcs["radio"].holders} == {"one"}
+        assert not here.rcs["right"].holders
+        await here.clock.sleep_s(6.0)
+        assert two.is_open, "it gets its turn"
+
+
+def _require_a_revocation_for_capacity(trace: Path) -> None:
+    lines = [json.loads(line) for line in trace.read_text().splitlines()]
     lines = lines[[line["ev"] for line in lines].index("meta", 1) :]
     assert next(line["why"] for line in lines if line["ev"] == "revoke") == "capacity"
     assert check(lines) == []
