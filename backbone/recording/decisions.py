@@ -47,6 +47,19 @@ class NoSuchRule(Refusal):
     remedy = "Name a rule and its value as the mission file does, such as policy=strict."
 
 
+class _Life:
+    """The present life of the RC manager, each of which numbers its messages anew."""
+
+    def __init__(self) -> None:
+        self._sequence, self._at_s = 0, 0.0
+
+    def ended_before(self, message: Recorded) -> bool:
+        """Return whether this message of the RC manager, the next one in time, is of another life than the last."""
+        is_other = message.sequence <= self._sequence and message.at_s > self._at_s
+        self._sequence, self._at_s = message.sequence, message.at_s
+        return is_other
+
+
 class RecordedSchedule:
     """The schedule, followed through the decisions in a recording.
 
@@ -61,9 +74,17 @@ class RecordedSchedule:
         self.lacks = "the recording has no state of the schedule"
         self.unread = 0
         self._number = 0
+        self._life = _Life()
 
-    def take(self, told: Decided | ScheduleSnapshot) -> None:
-        """Apply the next event, or take over the state of a snapshot; after one of another release it is not known."""
+    def take(self, told: Decided | ScheduleSnapshot, message: Recorded) -> None:
+        """Apply the next event, or take over the state of a snapshot; after one of another release it is not known.
+
+        Args:
+            message: The recorded message that holds it. If it begins another life of the RC manager, only a snapshot
+                makes the state known again.
+        """
+        if self._life.ended_before(message):
+            self._lose(told.at_s)
         match told:
             case ScheduleSnapshot():
                 if self.manager is None or told.number != self._number:
@@ -71,9 +92,12 @@ class RecordedSchedule:
             case Decided() if self.manager is not None and told.number == self._number + 1:
                 self._number += 1
                 self.manager.handle(told.event, told.at_s)
-            case Decided() if self.manager is not None and told.number > self._number:
-                self.manager = None
-                self.lacks = f"decisions are missing in the recording before {told.at_s:.3f} s"
+            case Decided() if self.manager is not None:
+                self._lose(told.at_s)
+
+    def _lose(self, at_s: float) -> None:
+        self.manager = None
+        self.lacks = f"decisions are missing in the recording before {at_s:.3f} s"
 
     def _take_over(self, told: ScheduleSnapshot) -> None:
         try:
@@ -96,7 +120,7 @@ def schedule_at(recording: Recording, at_s: float, reviver: Reviver | None = Non
     for message in _in_order(recording.messages(_DECISIONS, 0.0, at_s, RC_MANAGER)):
         match reviver.revived(message, Decided, ScheduleSnapshot):
             case Decided() | ScheduleSnapshot() as told:
-                schedule.take(told)
+                schedule.take(told, message)
     reviver.unread += schedule.unread
     if schedule.manager is None:
         raise NotRecorded(f"{schedule.lacks}, asked for {at_s:.3f} s")
@@ -130,7 +154,8 @@ class DecisionComparison:
         decisions: Number of compared decisions.
         grants: Number of grants among their lines.
         missing: Number of decisions that could not be compared, because the recording lacks the event or lines.
-            The last one is not counted if only the recording's end can have cut it off.
+            The last one is not counted if only the recording's end can have cut it off, nor are those before the
+            first snapshot.
         unread: Number of messages of another form or version, which are left out.
         difference: The first difference; None: all decisions are equal.
     """
@@ -182,15 +207,16 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
     number, began = 0, False
     for step in _steps(recording, since_s, reviver):
         found.unread = reviver.unread
+        if step is None:
+            anew, number = None, 0  # skip decisions until the next snapshot
+            continue
         if isinstance(step, ScheduleSnapshot):
-            if anew is None or step.number == 0:
+            if step.number == 0 or (anew is None and not (began and rules)):
                 anew, number, began = _Anew(step, rules), step.number, True
             continue
-        if anew is None or step.decided.number <= number:
-            continue
-        found.missing += step.decided.number - number - 1
-        if step.decided.number != number + 1:
-            anew = None  # skip decisions until the next snapshot
+        if anew is None or step.decided.number != number + 1:
+            found.missing += max(1, step.decided.number - number) if began else 0
+            anew, number = None, step.decided.number
             continue
         number = step.decided.number
         found.difference = anew.of_itself(number, step.decided.at_s)
@@ -277,11 +303,20 @@ def _first(begin: ScheduleSnapshot, rules: dict[str, Any]) -> ScheduleManager:
     return manager.begun_anew(chosen, load_planner(chosen.planner))
 
 
-def _steps(recording: Recording, since_s: float, reviver: Reviver) -> Iterator[ScheduleSnapshot | _RecordedDecision]:
-    """Yield the snapshots, and the decisions with their lines."""
+def _steps(
+    recording: Recording, since_s: float, reviver: Reviver
+) -> Iterator[ScheduleSnapshot | _RecordedDecision | None]:
+    """Yield the snapshots, the decisions with their lines, and None between two lives of the RC manager."""
     step: _RecordedDecision | None = None
+    life = _Life()
     for message in _in_order(recording.messages(since_s=since_s, source=RC_MANAGER)):
         unread, told = reviver.unread, reviver.revived(message, Decided, ScheduleSnapshot, TraceLine)
+        if life.ended_before(message):
+            if step is not None:
+                step.is_last = True
+                yield step
+            step = None
+            yield None
         if step is not None and reviver.unread == unread:
             step.heard.append(message.sequence)
             if isinstance(told, ScheduleSnapshot | Decided):

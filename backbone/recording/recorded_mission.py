@@ -112,7 +112,7 @@ class RecordedMission:
             case OperatorActed():
                 self._log.add(said.event(message.source, message.cause))
             case Decided() | ScheduleSnapshot():
-                self._schedule.take(said)
+                self._schedule.take(said, message)
         if conversation == Conversation.ASK and said is not None:
             self._asked_or_answered(address, message, said)
 

@@ -157,6 +157,46 @@ def test_what_is_missing_is_counted_and_no_difference(recorded: RecordMission):
     assert sum(one.missing for one in found) > 0
 
 
+def late_for_restarts(recording: Recording, lost: int, short: int = 1_000_000) -> Recording:
+    """Return the recording of a recorder that overheard each restarted RC manager only after so many messages.
+
+    Args:
+        short: Number of messages after which the first RC manager fell.
+    """
+    file, newest, lives = io.BytesIO(), 0, 1
+    writer = RecordingWriter(file, CLASSES, {})
+    for one in recording.messages(source=RC_MANAGER):
+        said = message_as_sent(CLASSES, one)
+        assert said is not None
+        lives += one.sequence < newest
+        newest = one.sequence
+        if one.sequence <= short if lives == 1 else one.sequence > lost:
+            writer.write(one.key, write(Envelope(WIRE_VERSION, one.source, one.sequence, one.at_s, "", said)), one.at_s)
+    writer.finish()
+    return Recording(file)
+
+
+@pytest.mark.parametrize(("lost", "short"), [(5, 1_000_000), (20, 30), (20, 60)])
+def test_decisions_of_a_restarted_rc_manager_are_not_those_of_the_former(
+    recorded: RecordMission, lost: int, short: int
+):
+    found = [decided_anew(late_for_restarts(recorded(seed), lost, short)) for seed in SEEDS]
+    assert [one.difference for one in found if one.difference is not None] == []
+    assert sum(one.missing for one in found) > 0
+    assert all(one.decisions > 0 for one in found)
+
+
+def test_the_schedule_of_a_former_life_is_not_that_of_the_restarted_rc_manager(recorded: RecordMission):
+    late = late_for_restarts(recorded(1), 5)
+    number, restarted_s = 0, 0.0
+    for one in late.messages(source=RC_MANAGER):
+        restarted_s = restarted_s or (one.at_s if one.sequence < number else 0.0)
+        number = one.sequence
+    assert schedule_at(late, restarted_s - 0.01)
+    with pytest.raises(NotRecorded, match="decisions are missing"):
+        schedule_at(late, restarted_s + 1.0)
+
+
 def test_aging_before_the_slowest_resource_is_handed_over_is_refused_as_in_a_mission_file(recorded: RecordMission):
     file = io.BytesIO()
     writer = RecordingWriter(file, CLASSES, {})
