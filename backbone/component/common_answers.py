@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from itertools import islice
+from numbers import Integral, Real
 from typing import ClassVar, Protocol
 
 import msgspec
@@ -20,6 +22,7 @@ from backbone.component.messages import (
     AskStory,
     AskTime,
     ComponentState,
+    LogLevel,
     MissionTime,
     OtherIncarnation,
     Parameters,
@@ -31,6 +34,7 @@ from backbone.component.messages import (
     WrongParameter,
 )
 from backbone.component.story import StoryBook
+from backbone.ranges import LONGEST_MENTION, MOST_ENTRIES, MOST_MEASURE
 from backbone.spoken import value_text
 from backbone.wire import Envelope, Message
 
@@ -57,6 +61,9 @@ class Answering(Protocol):
     def change_parameters(self, changed: Mapping[str, object]) -> None:
         """Replace the values of these parameters."""
 
+    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
+        """Add an event to the story, and publish it to the mission's log."""
+
     def end(self, reason: str) -> None:
         """End in good order."""
 
@@ -73,6 +80,7 @@ class CommonAnswers:
 
     def __init__(self, component: Answering) -> None:
         self._component = component
+        self._has_warned = False
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer a common question; the component answers all others.
@@ -111,7 +119,20 @@ class CommonAnswers:
         is_virtual = isinstance(clock, VirtualClock)  # a mission on virtual time is the same each time
         process = {} if is_virtual else {PROCESSOR_S: time.process_time()}
         dropped = {f"{MESSAGES_DROPPED}{key}": float(count) for key, count in bus.dropped().items()}
-        return Statistics({**counts, **process, **dropped, **self._component.statistics()})
+        common = {**counts, **process, **dropped}
+        return Statistics({**common, **self._own_statistics(MOST_ENTRIES - len(common))})
+
+    def _own_statistics(self, most: int) -> dict[str, float]:
+        """Return those that a message can hold, at most so many; the first time that one is left out, log it."""
+        own = self._component.statistics()
+        legal = dict(islice(((name, float(value)) for name, value in own.items() if is_measure(name, value)), most))
+        left_out = next((name for name in own if name not in legal), None)
+        if left_out is not None and not self._has_warned:
+            self._has_warned = True
+            fits = f"at most {MOST_ENTRIES} finite numbers, with names of at most {LONGEST_MENTION} characters"
+            what = f"its statistics are without {left_out!r}, which is {own[left_out]!r}; they hold {fits}"
+            self._component.publish_event("statistics", what, LogLevel.WARNING)
+        return legal
 
     def _set_parameter(self, name: str, value: object, user: str) -> Parameters:
         component, old = self._component, msgspec.to_builtins(self._component.parameters)
@@ -127,3 +148,16 @@ class CommonAnswers:
         component.change_parameters({name: value})
         component.story.note(name, f"{user} set {name} from {value_text(old[name])} to {value_text(value)}")
         return Parameters(msgspec.to_builtins(component.parameters))
+
+
+def is_measure(name: object, value: object) -> bool:
+    """Return whether a message can hold this statistic.
+
+    Example:
+        >>> is_measure("queue_s", 0.5), is_measure("queue_s", float("nan")), is_measure("queue_s", "long")
+        (True, False, False)
+    """
+    if isinstance(value, bool) or not isinstance(value, Real) or not isinstance(name, str):
+        return False
+    size: float | int = int(abs(value)) if isinstance(value, Integral) else float(abs(value))
+    return len(name) <= LONGEST_MENTION and size <= MOST_MEASURE

@@ -167,7 +167,7 @@ class Component(Generic[P_co]):
         """
 
     def statistics(self) -> dict[str, float]:
-        """Return named counters and measures, units in the names."""
+        """Return named counters and measures, units in the names. One that is no finite number is left out."""
         return {}
 
     def absences(self) -> list[Absence]:

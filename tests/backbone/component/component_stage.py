@@ -64,6 +64,7 @@ class Walker(Component[Gait]):
         self.stumble, self.hold, self.by = stumble, hold, by
         self.diary: list[str] = []
         self.pokes = 0
+        self.odd: dict[Any, Any] = {}  # further statistics, as a beginner may return them
         self.is_over = False
 
     async def at(self, hook: str) -> None:
@@ -92,7 +93,7 @@ class Walker(Component[Gait]):
         self.diary.append(f"step {self.parameters.step_s:g} s")
 
     def statistics(self) -> dict[str, float]:
-        return {"pokes": self.pokes}
+        return {"pokes": self.pokes, **self.odd}
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         self.pokes += 1

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 import pytest
 from component_stage import TOWER, WALKER, Gait, Poke, Poked, Stage, TooSteep, Walker, launch, live
 
@@ -24,6 +26,8 @@ from backbone.component.messages import (
     WrongParameter,
 )
 from backbone.keys import Conversation
+from backbone.ranges import MOST_ENTRIES
+from backbone.wire import WIRE_VERSION, Envelope, Reader, write
 
 # Questions everybody answers
 
@@ -91,6 +95,55 @@ def test_statistics_join_the_bus_and_the_component() -> None:
         values = (await stage.ask(AskStatistics(), Statistics)).values
         assert values["pokes"] == 1.0
         assert values["bus_answered"] == 2.0
+        stage.walker.end("enough")
+        await life
+
+    live(law())
+
+
+@pytest.mark.parametrize(
+    ("odd", "legal"),
+    [
+        ({"queue_s": math.nan}, {}),
+        ({"queue_s": -math.inf, "load": 0.5}, {"load": 0.5}),
+        ({"frames": 10**30}, {}),
+        ({"mode": "fast", "is_on": True, "none": None, "list": [1]}, {}),
+        ({5: 1.0, "n" * 256: 1.0}, {}),
+        ({'a "name"\n': 1.0}, {'a "name"\n': 1.0}),
+        ({"share": np.float32(0.5), "frames": np.int64(7)}, {"share": 0.5, "frames": 7.0}),
+    ],
+)
+def test_a_statistic_that_no_message_can_hold_does_not_hide_the_others(
+    odd: dict[Any, Any], legal: dict[str, float]
+) -> None:
+    async def law() -> None:
+        stage = Stage()
+        logged: list[StoryEvent] = []
+        stage.tower.subscribe(WALKER, Conversation.LOG, StoryEvent, lambda e: logged.append(e.body))
+        life = await stage.begin()
+        stage.walker.odd = odd
+        for _again in range(2):
+            told = await stage.ask(AskStatistics(), Statistics)
+            values = Reader(Statistics).read(write(Envelope(WIRE_VERSION, WALKER, 1, 0.0, "", told))).body.values
+            assert {"pokes", "bus_answered"} <= values.keys()
+            assert {name: value for name, value in values.items() if name in odd} == legal
+        await stage.clock.sleep_s(0.1)
+        assert len(logged) == (len(legal) < len(odd)), "it is logged once"
+        assert all(repr(next(iter(odd))) in event.what for event in logged)
+        stage.walker.end("enough")
+        await life
+
+    live(law())
+
+
+def test_more_statistics_than_a_message_holds_are_cut() -> None:
+    async def law() -> None:
+        stage = Stage()
+        life = await stage.begin()
+        stage.walker.odd = {f"n{number}": 1.0 for number in range(MOST_ENTRIES + 1)}
+        values = (await stage.ask(AskStatistics(), Statistics)).values
+        assert len(values) == MOST_ENTRIES
+        assert {"bus_answered", "pokes", "n0"} <= values.keys()
         stage.walker.end("enough")
         await life
 
