@@ -25,8 +25,9 @@ from backbone.errors import Refusal
 from backbone.recording.hearing import is_meant
 from backbone.recording.translation import Translated
 from backbone.recording.writer import ABOUT, NS, PROFILE
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES
 
-MOST_RECORD_BYTES = 64 * 1024 * 1024  # chosen: eight times the largest message; a damaged length asks for terabytes
+MOST_RECORD_BYTES = 2 * MAX_LARGE_MESSAGE_BYTES  # chosen: a whole chunk fits; a damaged length asks for terabytes
 ROOM = 20  # chosen: twice the calls from a command's loop over messages to the encoder of JSON
 NOTHING_OF_ONE = "Name a recording; this file has nothing of one."
 DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
