@@ -23,6 +23,7 @@ from backbone.scheduling.views import Why
 from backbone.spoken import counted
 
 TOGETHER_S = 0.5  # chosen: when the hub goes, all tokens fall and rise within 10 ms (measured); mission seconds
+_TOKEN = f"/{Conversation.ALIVE}"
 _SAID = tuple(f"*/{said}" for said in (Conversation.STATUS, Conversation.HEALTH, Conversation.ASK, Conversation.ALIVE))
 
 
@@ -103,7 +104,7 @@ def _last_said(recording: Recording, at_s: float, reviver: Reviver) -> _LastSaid
                 said.states[component_of(state.address)] = state
             case MissionHealth(absent=absent):
                 said.absent = absent
-            case Presence(alive=alive):
+            case Presence(alive=alive) if message.key.endswith(_TOKEN):
                 name = component_of(address_of(message.key))
                 said.left_s.pop(name, None)
                 if not alive:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 
 import msgspec
 
-from backbone.addresses import LAUNCHER, NAMESERVER
+from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.component.messages import (
     AskState,
     AskTime,
@@ -103,7 +103,7 @@ class RecordedMission:
         if conversation in STATES:
             self._newest[message.key, message.schema] = message
         match said:
-            case Presence(alive=alive):
+            case Presence(alive=alive) if conversation == Conversation.ALIVE:
                 self._presence_changed(address, alive)
             case ComponentState() if conversation != Conversation.ASK or message.source == said.address:
                 self._states[said.address] = said
@@ -111,7 +111,7 @@ class RecordedMission:
                 self._log.add(said)
             case OperatorActed():
                 self._log.add(said.event(message.source, message.cause))
-            case Decided() | ScheduleSnapshot():
+            case Decided() | ScheduleSnapshot() if message.source == RC_MANAGER:
                 self._schedule.take(said, message)
         if conversation == Conversation.ASK and said is not None:
             self._asked_or_answered(address, message, said)
