@@ -21,10 +21,11 @@ class Checkpoints:
 
     Args:
         classes: Known message classes, by schema.
+        most: Approximate number of checkpoints that are kept; 0: none, for a reader that asks once.
     """
 
-    def __init__(self, classes: Mapping[str, type[Message]]) -> None:
-        self._classes = classes
+    def __init__(self, classes: Mapping[str, type[Message]], most: int = MOST) -> None:
+        self._classes, self._most = classes, most
         self._times_s = [-math.inf]
         self._missions = [RecordedMission(classes)]
 
@@ -37,7 +38,7 @@ class Checkpoints:
         newest = bisect_right(self._times_s, at_s) - 1
         mission, since_s = self._missions[newest].copied(), self._times_s[newest]
         contents = recording.contents()
-        each_s = max(EACH_S, (contents.end_s - contents.begin_s) / MOST)
+        each_s = max(EACH_S, (contents.end_s - contents.begin_s) / self._most) if self._most else math.inf
         next_s, last_s = max(since_s, contents.begin_s) + each_s, -math.inf
         until_s = (round(at_s * NS) - 1) / NS  # a recording counts whole nanoseconds
         for message in recording.messages(_KNOWN, max(0.0, since_s), until_s):

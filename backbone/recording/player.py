@@ -40,7 +40,7 @@ class Player:
         since_s: Mission time at which it begins; earlier messages are known.
         keys: Patterns of the keys whose publications are played; none: all.
         next_step: Awaited before each publication, with the message; None: play in the recorded time.
-        checkpoints: Checkpoints of the same recording; None: the recording is read from its begin.
+        checkpoints: Checkpoints of the same recording; None: the recording is read from its begin, and none is kept.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Player:
     ) -> None:
         self._bus, self._clock, self._recording = bus, clock, recording
         self._since_s, self._keys, self._next_step = since_s, keys, next_step
-        self._classes, self._checkpoints = classes, checkpoints or Checkpoints(classes)
+        self._classes, self._checkpoints = classes, checkpoints or Checkpoints(classes, most=0)
         self._mission = RecordedMission(classes)
         self._ahead = ReadAhead(recording, classes, since_s, self._key_ahead)
         self._accepts = reduce(or_, classes.values())

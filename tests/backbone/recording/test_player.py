@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
@@ -33,11 +34,12 @@ from backbone.keys import Conversation
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.mission_log.log import AskLog, Log
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.recording.checkpoints import EACH_S
 from backbone.recording.playback import Playback
 from backbone.recording.player import Player
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.recorded_mission import NotAnswered, TakesNoCommands
+from backbone.recording.recorded_mission import NotAnswered, RecordedMission, TakesNoCommands
 from backbone.wire import Envelope, Message
 from resource_pool.commands import Move
 
@@ -115,6 +117,21 @@ def played(
 
 
 tokens: list[tuple[str, bool]] = []
+
+
+def test_a_replay_from_the_middle_keeps_no_state_of_earlier_instants():
+    """Each hundred half minutes of a mission of twenty components took 50 MB."""
+    since_s = 20 * EACH_S
+    recording = recording_of(*(Said(n * EACH_S, SCOUT, Conversation.LOG, event(n)) for n in range(22)))
+    kept = list[int]()
+
+    async def scene(_bus: LocalBus, _clock: VirtualClock, _player: Player) -> None:
+        kept.append(sum(isinstance(one, RecordedMission) for one in gc.get_objects()))
+
+    gc.collect()
+    before = sum(isinstance(one, RecordedMission) for one in gc.get_objects())
+    played(recording, scene, since_s=since_s)
+    assert kept[0] - before <= 2
 
 
 @settings(max_examples=share(60))
