@@ -93,7 +93,8 @@ def _place(key: str, mission: str) -> tuple[str, Conversation]:
     address, _, name = short.rpartition("/")
     known = {one.value: one for one in Conversation if one not in LEFT_OUT}
     if name not in known or "/" not in address or "*" in address:
-        raise NoKey(f"{key!r} is no key of one component{did_you_mean(name, known)}")
+        hint = did_you_mean(name, known) if name not in known else ""
+        raise NoKey(f"{key!r} is no key of one component{hint}")
     try:
         key_of(mission, address, known[name])
     except IllegalName as error:

@@ -70,6 +70,7 @@ def test_a_key_of_no_component_is_refused_and_the_log_names_no_sender(
     with pytest.raises(NoKey) as refused:
         run_virtual(injecting.inject(Where(None, None, None), key, '{"schema": "AskTime"}', 1.0))
     assert key in refused.value.detail
+    assert "did you mean" not in refused.value.detail, "its conversation is one"
     assert not acted
 
 
