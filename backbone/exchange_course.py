@@ -157,17 +157,21 @@ def hand_over(old: object, new: object) -> bool:
     """Copy the attributes that both classes name in ``hands_over`` to the new part; return whether it was done.
 
     They are copied because the old part may come back. If a value has another class than in the new part, none is
-    copied.
+    copied; None fits any class.
     """
     names = frozenset[str](getattr(type(old), "hands_over", ()))
     if not names or names != getattr(type(new), "hands_over", None):
         return False
     values = {name: getattr(old, name) for name in sorted(names)}
-    if any(_name_of(value) != _name_of(getattr(new, name)) for name, value in values.items()):
+    if any(not _fits(value, getattr(new, name)) for name, value in values.items()):
         return False
     for name, value in copy.deepcopy(values).items():  # one copy, so that two attributes still share objects
         setattr(new, name, value)
     return True
+
+
+def _fits(old: object, new: object) -> bool:
+    return old is None or new is None or _name_of(old) == _name_of(new)
 
 
 def _name_of(value: object) -> str:

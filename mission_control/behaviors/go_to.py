@@ -70,6 +70,7 @@ W = TypeVar("W", bound=WayParameters)
 class Goer(Driver[W]):
     """Base class of behaviors that go to a place: derive and override ``place``."""
 
+    hands_over = frozenset({"way"})
     never = Driver.never | {Lost.code, OutsideRoom.code}
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

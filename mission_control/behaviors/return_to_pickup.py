@@ -52,6 +52,7 @@ class ReturnToPickup(Servo[PickupParameters]):
     """Succeeds at its place before the mark, from any start; fails if it does not find the mark."""
 
     parameters_type = PickupParameters
+    hands_over = Servo.hands_over | {"route"}
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

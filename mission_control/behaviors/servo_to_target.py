@@ -76,6 +76,7 @@ class Servo(Driver[S]):
     """Base class of servoing behaviors: pictures in, commands out."""
 
     needs_arc = "capture"
+    hands_over = frozenset({"_servo", "_acquisitions", "_counted_rad", "_told_s"})
     never = Driver.never | {UnusablePicture.code}
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

@@ -95,3 +95,10 @@ def test_nothing_is_handed_over_to_a_class_that_declares_otherwise(kind: type) -
     old.marks.append(1)
     assert not hand_over(old, new)
     assert getattr(new, "marks", []) == []
+
+
+def test_none_stands_for_a_value_of_any_class() -> None:
+    old, new = Kept(), AlsoKept()
+    new.marks = None  # type: ignore[assignment]
+    assert hand_over(old, new)
+    assert new.marks == []

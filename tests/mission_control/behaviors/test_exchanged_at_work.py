@@ -8,18 +8,23 @@ from typing import Any
 
 import pytest
 from fake_resource_pool import FakePlacer
-from test_changed_while_asking import stand
+from test_changed_while_asking import GREY, stand
 
 from backbone.bus.clock import run_virtual
 from backbone.exchange import SwapClass, Swapped
 from mission_control.behaviors.give import Give
+from mission_control.behaviors.go_to import GoTo, NotThere
 from mission_control.behaviors.hide import Hide
 from mission_control.behaviors.jump_course import LANDED_AFTER_S
 from mission_control.behaviors.jump_over import JumpOver
+from mission_control.behaviors.pickup_route import PickupStage
+from mission_control.behaviors.return_to_pickup import ReturnToPickup
+from mission_control.behaviors.servo_to_target import ServoToTarget
 from mission_control.messages import BehaviorStatus
 from resource_pool.commands import Jump
 
 OVER = {"localizer": "eye", "front": "5,0", "heading_deg": 0.0}
+MOST_LOST = 8  # pictures: the first moves nothing, and a search begins with a look of half a second
 RUN_UP, TAKE_OFF, BEYOND = (4.5, 0.0), (4.8, 0.0), (9.0, 0.0)
 
 
@@ -80,5 +85,53 @@ def test_looks_around_count_for_the_new_class_too(local_mission: Any, exchange: 
             await arc.grant()
             behavior.search.looks = 1
             assert (await exchange(placer, behavior)).search.looks == 1
+
+    run_virtual(scene())
+
+
+def test_the_time_on_the_way_counts_for_the_new_class_too(local_mission: Any, exchange: Any) -> None:
+    async def scene() -> None:
+        way = {"localizer": "eye", "x_m": 5.0, "y_m": 0.0, "within_s": 3.0}
+        async with stand(local_mission, GoTo, **way) as (behavior, arc, _eye, placer):
+            await arc.grant()
+            began_s = placer.clock.now_s()
+            await placer.clock.sleep_s(2.0)
+            present = await exchange(placer, behavior)
+            await placer.wait(lambda: present.status is BehaviorStatus.FAILURE, 5.0)
+            assert present.payload["code"] == NotThere.code
+            assert placer.clock.now_s() - began_s == pytest.approx(3.0, abs=0.3)
+
+    run_virtual(scene())
+
+
+def test_turns_of_a_search_count_for_the_new_class_too(local_mission: Any, exchange: Any) -> None:
+    async def pictures_until_failure(exchanged_after: int) -> int:
+        async with stand(local_mission, ServoToTarget, search_turns=0.5) as (behavior, arc, _eye, placer):
+            await arc.grant()
+            for picture in range(1000):
+                if picture == exchanged_after:
+                    behavior = await exchange(placer, behavior)
+                if behavior.status is BehaviorStatus.FAILURE:
+                    return picture
+                arc.publish(GREY, 320, 240)
+                await placer.clock.sleep_s(0.1)
+            return 1000
+
+    async def scene() -> None:
+        undisturbed = await pictures_until_failure(-1)
+        assert 10 < undisturbed < 1000
+        assert await pictures_until_failure(undisturbed // 2) <= undisturbed + MOST_LOST
+
+    run_virtual(scene())
+
+
+def test_searches_in_vain_count_for_the_new_class_too(local_mission: Any, exchange: Any) -> None:
+    async def scene() -> None:
+        given = {"localizer": "eye", "near": "5,0", "attempts": 2}
+        async with stand(local_mission, ReturnToPickup, **given) as (behavior, arc, _eye, placer):
+            await arc.grant()
+            behavior.route.not_found()
+            present = await exchange(placer, behavior)
+            assert (present.route.in_vain, present.route.stage) == (1, PickupStage.TRAVEL)
 
     run_virtual(scene())
