@@ -238,6 +238,7 @@ class BehaviorExchanges:
         assert going is not None  # noqa: S101  the course of this exchange has changed
         works, beside = (going.new, going.old) if going.course.new_works else (going.old, going.new)
         beside.stand_by()
+        self._tell_of_commands(going)
         self.present = works
         works.take_charge()
         self._news.set()
@@ -245,6 +246,20 @@ class BehaviorExchanges:
             self._tell(f"{going.asked.class_path} is in charge, and has to prove itself", LogLevel.INFO)
         elif going.course.is_over and beside in self._lives:
             self._lives[beside].cancel()
+
+    def _tell_of_commands(self, going: _BehaviorExchange) -> None:
+        """Let the old implementation know each command of the new one that it may have to go on after."""
+        gate = going.new.gate
+        gate.on_command = partial(self._obeyed, going.old) if going.course.phase is ExchangePhase.PROVING else None
+        if going.course.phase is ExchangePhase.RETURNED:
+            for command in gate.under_way:
+                self._obeyed(going.old, command)
+
+    def _obeyed(self, old: Implementation, command: Message) -> None:
+        try:
+            old.robot_obeyed(command)
+        except Exception as bug:
+            old.fail(bug)
 
     async def _returned(self, going: _BehaviorExchange, anew: ReadAnew[type[Implementation]]) -> str:
         anew.undo()

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from backbone.mission.class_facts import ANY_ARC
+from backbone.wire import Message
 from mission_control.behavior_tree import ArcNeed
 from mission_control.children import Children, Decision
 from mission_control.messages import BehaviorStatus
@@ -85,6 +86,14 @@ class BehaviorHooks:
         soon as it has enough data, such as pictures. Not: wait.
         """
         return True
+
+    def robot_obeyed(self, command: Message) -> None:
+        """Take a command of another class into account.
+
+        When: for each command of a new class during its trial (``scout-backbone swap``), because this class comes back
+        if the trial fails; also for a command without an answer. What: record an effect that outlasts the command, such
+        as a jump. Not: send commands.
+        """
 
     def not_now(self) -> float:
         """Return the time that the behavior needs beyond the end of the slice.

@@ -28,7 +28,7 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.component.messages import Register, Registered
-from backbone.errors import Refusal
+from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.quality import Quality
@@ -70,6 +70,8 @@ class GatedBus:
         is_open: True: the implementation is in charge.
         answer: Answers questions to the component.
         commands: Number of answered commands to the resource pool.
+        under_way: Commands to the resource pool that have no answer yet.
+        on_command: Called with each command that was applied, or may have been: its answer is missing.
     """
 
     def __init__(self, bus: Bus, *, is_first: bool = True) -> None:
@@ -81,7 +83,8 @@ class GatedBus:
         self.commands = 0
         self._opened, self._quiet = asyncio.Event(), asyncio.Event()
         self._quiet.set()
-        self._under_way = 0
+        self.under_way: list[Message] = []
+        self.on_command: Callable[[Message], None] | None = None
         self._heard: dict[HeardThrough, None] = {}
         if is_first:
             self._opened.set()
@@ -125,16 +128,24 @@ class GatedBus:
             raise SwappedOut(
                 f"{self.source}: another class is in charge", reason="exchange", by="", expected_start_s=-1
             )
-        self._under_way += 1
+        self.under_way.append(question)
         self._quiet.clear()
         try:
             answered = await self.bus.ask(address, question, reply, within_s=within_s)
             self.commands += 1
+            self._note(question)
             return answered
+        except LinkError:
+            self._note(question)
+            raise
         finally:
-            self._under_way -= 1
-            if not self._under_way:
+            self.under_way.remove(question)
+            if not self.under_way:
                 self._quiet.set()
+
+    def _note(self, command: Message) -> None:
+        if self.on_command is not None:
+            self.on_command(command)
 
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Publish through the open gate; see ``Bus.publish``."""

@@ -18,7 +18,7 @@ from backbone.errors import complaint
 from backbone.exchange import NotExchanged, SwapClass
 from backbone.exchange_course import UNPROVED, class_path_of, hand_over
 from backbone.reading_anew import WrongClass
-from backbone.wire import Accepts
+from backbone.wire import Accepts, Message
 from mission_control.behavior_tree import BehaviorNode
 from mission_control.gated_bus import GatedBus
 from mission_control.messages import BehaviorStatus
@@ -60,6 +60,9 @@ class Implementation(Protocol):
 
     def parameters_changed(self) -> None:
         """Apply the parameters."""
+
+    def robot_obeyed(self, command: Message) -> None:
+        """Take a command of the class in charge into account."""
 
     def go_on_from(self, other: Self) -> None:
         """Take over the state of another implementation of the component, and its exchanges."""

@@ -85,6 +85,7 @@ __all__ = [
     "Frame",
     "GivenBeforeStop",
     "Halt",
+    "Jump",
     "LandmarkSighting",
     "NoSuchAction",
     "NotMyArc",

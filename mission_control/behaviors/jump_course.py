@@ -126,6 +126,13 @@ class JumpCourse:
         """Record that the robot obeyed the last ``Act.JUMP``."""
         self.jumps += 1
 
+    def jumped_already(self, now_s: float) -> None:
+        """Record a jump of the robot that this course has not decided."""
+        if not self.is_final:
+            self._enter(JumpStage.AIRBORNE)
+        self._jumped_s, self._is_seen_landing = now_s, False
+        self.jumped()
+
     def decide(self, position: Position, now_s: float) -> Motion | Act:
         """Return the next motion or action.
 

@@ -18,12 +18,14 @@ from msgspec import Meta
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.ranges import Measure
+from backbone.wire import Message
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
 from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, JumpStage, Obstacle
 from mission_control.behaviors.motion import FARTHEST_M, Attempts, DrivingSpeed, Motion, NamedLocalizer, read_places
 from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import Jump
 
 
 class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -86,6 +88,11 @@ class JumpOver(Driver[JumpOverParameters]):
     def not_now(self) -> float:
         """Return the time until the robot has landed; see ``Behavior.not_now``."""
         return self.course.airborne_s(self.clock.now_s())
+
+    def robot_obeyed(self, command: Message) -> None:
+        """Wait for the landing of a jump that another class commanded; see ``Behavior.robot_obeyed``."""
+        if isinstance(command, Jump):
+            self.course.jumped_already(self.clock.now_s())
 
     def interrupted(self) -> None:
         """Decide next only from the robot's position; see ``Driver.interrupted``."""

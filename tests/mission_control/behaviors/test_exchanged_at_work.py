@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -108,10 +109,11 @@ def test_turns_of_a_search_count_for_the_new_class_too(local_mission: Any, excha
     async def pictures_until_failure(exchanged_after: int) -> int:
         async with stand(local_mission, ServoToTarget, search_turns=0.5) as (behavior, arc, _eye, placer):
             await arc.grant()
+            present = behavior
             for picture in range(1000):
                 if picture == exchanged_after:
-                    behavior = await exchange(placer, behavior)
-                if behavior.status is BehaviorStatus.FAILURE:
+                    present = await exchange(placer, behavior)
+                if present.status is BehaviorStatus.FAILURE:
                     return picture
                 arc.publish(GREY, 320, 240)
                 await placer.clock.sleep_s(0.1)
@@ -133,5 +135,48 @@ def test_searches_in_vain_count_for_the_new_class_too(local_mission: Any, exchan
             behavior.route.not_found()
             present = await exchange(placer, behavior)
             assert (present.route.in_vain, present.route.stage) == (1, PickupStage.TRAVEL)
+
+    run_virtual(scene())
+
+
+@pytest.mark.parametrize("under_way", [False, True])
+def test_the_class_that_comes_back_knows_of_a_jump_during_the_trial(
+    local_mission: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, under_way: bool
+) -> None:
+    """The new class fails after the jump, or while its command is under way; the robot must land undisturbed."""
+    monkeypatch.syspath_prepend(tmp_path)
+    name = f"fails_{'during' if under_way else 'after'}"
+    (tmp_path / f"{name}.py").write_text("from mission_control.behaviors.jump_over import JumpOver as Again\n")
+
+    async def scene() -> None:
+        async with stand(local_mission, JumpOver, **OVER) as (behavior, arc, eye, placer):
+            jumped_s: list[float] = []
+
+            def required(command: object) -> None:
+                if isinstance(command, Jump):
+                    jumped_s.append(placer.clock.now_s())
+                    if under_way:
+                        behavior.exchanges.present.fail(ValueError("planted"))
+
+            arc.require = required
+            eye.at = RUN_UP
+            await arc.grant()
+            swapping = asyncio.create_task(
+                placer.bus.ask(behavior.address, SwapClass(f"{name}:Again", prove_s=30.0), Swapped, within_s=60.0)
+            )
+            await placer.clock.sleep_s(1.0)
+            eye.at = TAKE_OFF
+            await placer.wait(lambda: jumped_s, 5.0)
+            if not under_way:
+                await placer.clock.sleep_s(0.5)
+                behavior.exchanges.present.fail(ValueError("planted"))
+            swapped = await swapping
+            assert (swapped.is_proved, behavior.exchanges.present) == (False, behavior), swapped.cause
+            await placer.clock.sleep_s(0.2)
+            eye.at = BEYOND
+            await placer.wait(lambda: behavior.status is BehaviorStatus.SUCCESS, LANDED_AFTER_S + 2.0)
+            after = [at_s for at_s, _epoch, _command in arc.commands if at_s > jumped_s[0]]
+            assert min(after) >= jumped_s[0] + LANDED_AFTER_S - 0.1
+            assert behavior.payload == {"jumps": 1}
 
     run_virtual(scene())
