@@ -11,7 +11,6 @@ Modules, behaviors and drivers are exchanged by the same rules:
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 from enum import StrEnum
 from typing import TypeVar
@@ -20,6 +19,7 @@ import msgspec
 
 from backbone.errors import complaint
 from backbone.exchange import Swapped
+from backbone.handed_state import NotConverted, copy_for_present_classes
 
 T = TypeVar("T")
 UNPROVED = (Exception, SystemExit, KeyboardInterrupt)
@@ -53,6 +53,7 @@ class ExchangeCourse:
     Attributes:
         cause: Why the old one came back, or could not be kept; empty: neither happened.
         keeps_state: True if the new one goes on with the state of the old one.
+        unconverted: Why the state could not be converted for the new one; empty: it could, or was not to be.
         rounds: Rounds, commands or calls of the new one while it did the work, up to the end of the exchange.
         switched_s: Time of the switch; None: there was none.
         ended_s: Time of the end; None: it is not over.
@@ -64,7 +65,7 @@ class ExchangeCourse:
     def __init__(self, rules: ExchangeRules, changed: Callable[[], None], now_s: float) -> None:
         self._rules, self._changed = rules, changed
         self.phase, self.cause, self.keeps_state, self.rounds = ExchangePhase.WARMING, "", False, 0
-        self.began_s = now_s
+        self.began_s, self.unconverted = now_s, ""
         self.switched_s: float | None = None
         self.ended_s: float | None = None
 
@@ -105,6 +106,18 @@ class ExchangeCourse:
         """End the exchange because the new part failed; the old part does the work."""
         self.end(ExchangePhase.RETURNED, now_s, cause)
 
+    def receive(self, now_s: float, hand_over: Callable[[], bool]) -> None:
+        """Hand the state over by ``hand_over``, which returns whether it did; its bug ends the exchange."""
+
+        def handed_over() -> bool:
+            try:
+                return hand_over()
+            except NotConverted as refusal:
+                self.unconverted = refusal.detail
+                return False
+
+        self.keeps_state = bool(self.tried(now_s, handed_over))
+
     def tried(self, now_s: float, act: Callable[[], T]) -> T | None:
         """Return the result of the new part; an exception ends the exchange."""
         try:
@@ -125,6 +138,8 @@ class ExchangeCourse:
         switched_s = ended_s if self.switched_s is None else self.switched_s
         is_proved = self.phase is ExchangePhase.PROVED
         warming_s = max(0.0, switched_s - self.began_s)  # the round that began it may be older than the request
+        if self.unconverted and is_proved:
+            remark = f"its state is fresh, because {self.unconverted}" + (f"; {remark}" if remark else "")
         return Swapped(is_proved, self.cause, self.keeps_state, warming_s, ended_s - switched_s, self.rounds, remark)
 
     def outcome(self, old: str, new: str) -> str:
@@ -139,7 +154,8 @@ class ExchangeCourse:
             return f"{old} {stays}, {new} failed: {self.cause}"
         after = f": {self.cause}" if self.cause else ""
         state = "with the state of" if self.keeps_state else "from a fresh state instead of"
-        return f"{new} goes on {state} {old}{after}"
+        why = f" ({self.unconverted})" if self.unconverted else ""
+        return f"{new} goes on {state} {old}{why}{after}"
 
 
 def remark_on_file(component: str, old: str, new: str) -> str:
@@ -158,6 +174,9 @@ def hand_over(old: object, new: object) -> bool:
 
     They are copied because the old part may come back. If a value has another class than in the new part, none is
     copied; None fits any class.
+
+    Raises:
+        NotConverted: A class of the values was changed in a file that was read anew.
     """
     names = frozenset[str](getattr(type(old), "hands_over", ()))
     if not names or names != getattr(type(new), "hands_over", None):
@@ -165,7 +184,7 @@ def hand_over(old: object, new: object) -> bool:
     values = {name: getattr(old, name) for name in sorted(names)}
     if any(not _fits(value, getattr(new, name)) for name, value in values.items()):
         return False
-    for name, value in copy.deepcopy(values).items():  # one copy, so that two attributes still share objects
+    for name, value in copy_for_present_classes(values).items():  # one copy, so that two attributes share objects
         setattr(new, name, value)
     return True
 

@@ -229,7 +229,7 @@ class BehaviorExchanges:
         if course.is_over:
             return
         now_s = old.clock.now_s()
-        course.keeps_state = bool(course.tried(now_s, partial(handed_over, old, new)))
+        course.receive(now_s, partial(handed_over, old, new))
         course.switch(now_s)
 
     def _changed(self) -> None:

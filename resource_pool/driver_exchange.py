@@ -287,7 +287,7 @@ class DriverExchanges:
         if not await self._is_quiet(going) or going.course.is_over:  # the new driver failed by itself meanwhile
             return
         now_s = self._now_s()
-        going.course.keeps_state = bool(going.course.tried(now_s, lambda: hand_over(going.old, going.new)))
+        going.course.receive(now_s, lambda: hand_over(going.old, going.new))
         if going.course.cause:
             return
         going.slot.works, going.slot.on_trial, going.slot.is_tried = going.new, self._failed, True

@@ -15,7 +15,6 @@ Rules of this file:
 
 from __future__ import annotations
 
-import copy
 import threading
 from collections.abc import Callable, Mapping
 
@@ -23,6 +22,7 @@ import msgspec
 
 from backbone.errors import complaint
 from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules
+from backbone.handed_state import copy_for_present_classes
 from mission_control.modules.module import Module
 from mission_control.modules.ports import type_name
 
@@ -50,10 +50,6 @@ class Exchange(ExchangeCourse):
         self._is_ready = is_ready
         self._missing_since_s: dict[str, float] = {}
         self._busy = threading.Lock()  # a round may run in a thread, while the event loop ends its time
-
-    def begin(self, now_s: float, hand_over: Callable[[], bool]) -> None:
-        """Hand the old one's state over to the new one, if ``hand_over`` returns True."""
-        self.keeps_state = bool(self.tried(now_s, hand_over))
 
     def round(self, now_s: float, old: Turn, new: Turn) -> Turned:
         """Run the modules in this round; return the outputs of the producing one."""
@@ -118,12 +114,15 @@ def handed_over(old: Module, new: Module) -> bool:
     """Give the new module a copy of the old one's state; return whether both states have the same fields and types.
 
     A copy is needed because both modules run.
+
+    Raises:
+        NotConverted: A class of the values was changed in a file that was read anew.
     """
     fields = _fields(old.State)
     if not fields or fields != _fields(new.State):
         return False
     values = {name: getattr(old.state, name) for name in fields}
-    new.state = new.State(**copy.deepcopy(values))  # one copy, so that two fields still share objects
+    new.state = new.State(**copy_for_present_classes(values))  # one copy, so that two fields still share objects
     return True
 
 

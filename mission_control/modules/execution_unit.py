@@ -298,7 +298,7 @@ class ExecutionUnit:
         self._exchanging = _Exchanging(wanted.exchange, old, new, self._seats)
         order = wanted.graph.order[self.name]  # legal for the old one, too, because the new one has at least its inputs
         self._seats = sorted(self._seats, key=lambda seat: order.index(seat.name))
-        wanted.exchange.begin(now_s, lambda: handed_over(old.module, new.module))
+        wanted.exchange.receive(now_s, lambda: handed_over(old.module, new.module))
 
     def _end_exchange(self, pair: _Exchanging) -> None:
         self._exchanging = None
