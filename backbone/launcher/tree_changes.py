@@ -7,10 +7,11 @@ behavior ends, and starts as the file now declares it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from backbone.mission.behavior_orders import PathStep, behavior_order, node_of
+from backbone.mission.behavior_orders import PLACE_PARAMETERS, PathStep, behavior_order, node_of
 from backbone.mission.model import BehaviorDescription, MissionDescription
 from backbone.placer.messages import Start
 
@@ -40,11 +41,13 @@ class NewPlace:
 
     Attributes:
         order: The order that starts it from now on.
+        revised: The parameters of the order that say its place, and those that have changed.
         anew: Its children that end and start again.
         gone: Its former children.
     """
 
     order: Start
+    revised: Mapping[str, Any]
     anew: tuple[str, ...]
     gone: tuple[str, ...]
 
@@ -88,6 +91,7 @@ def consequences(old: MissionDescription, new: MissionDescription, anew: Collect
     told = [
         NewPlace(
             node.order,
+            _revised(before[name].order, node.order),
             tuple(child for child in node.children if child in anew and child in before[name].children),
             tuple(child for child in before[name].children if child not in node.children),
         )
@@ -109,6 +113,16 @@ def consequences(old: MissionDescription, new: MissionDescription, anew: Collect
 def orders(mission: MissionDescription) -> dict[str, Start]:
     """Return the order that starts each behavior of the tree, by name."""
     return {name: node.order for name, node in _nodes(mission).items()}
+
+
+def _revised(before: Start, after: Start) -> dict[str, Any]:
+    """Return the parameters to revise; the others may be those of an exchanged class, which no tree knows."""
+    had = before.parameters
+    return {
+        name: value
+        for name, value in after.parameters.items()
+        if name in PLACE_PARAMETERS or name not in had or had[name] != value
+    }
 
 
 def _nodes(mission: MissionDescription) -> dict[str, _Known]:

@@ -174,7 +174,7 @@ class TreeKeeper:
         Raises:
             Refusal: A new root did not start; it is not wanted then.
         """
-        await asyncio.gather(*(self._revise(told.order) for told in follows.told))
+        await asyncio.gather(*(self._revise(told) for told in follows.told))
         remarks = [await self._tell(told) for told in follows.told if told.gone]
         for name in follows.ended:
             await self._leave_root(name)
@@ -208,14 +208,15 @@ class TreeKeeper:
                 return
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
 
-    async def _revise(self, order: Start) -> None:
+    async def _revise(self, told: NewPlace) -> None:
         """Make its next start use the new order; the parent starts a component that is not placed."""
+        name = told.order.name
         try:
-            await self._ask(PLACER, ReviseStart(order.name, order.parameters), StartRevised)
+            await self._ask(PLACER, ReviseStart(name, dict(told.revised), others_stay=True), StartRevised)
         except NotPlaced:
             return
         except (LinkError, Refusal) as error:  # when it appears again, it gets its place
-            log.warning("%s: its order is not revised: %s", order.name, error)
+            log.warning("%s: its order is not revised: %s", name, error)
 
     async def _tell(self, told: NewPlace) -> str:
         """Send a running behavior its place; return a remark for the operator."""

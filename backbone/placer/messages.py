@@ -46,13 +46,15 @@ class ReviseStart(Message, frozen=True):
     """Start a component with these parameters from its next start on, on whichever host; its owner asks.
 
     Attributes:
-        parameters: All of them; the running component keeps its own.
+        parameters: All of them, unless ``others_stay``; the running component keeps its own.
         class_path: Class path from its next start on; empty: as before.
+        others_stay: True: parameters that are not named stay as they are.
     """
 
     name: Mention
     parameters: Values
     class_path: Line = ""
+    others_stay: bool = False
 
 
 class StartRevised(Message, frozen=True):

@@ -212,7 +212,8 @@ class Placer(Component[PlacerParameters]):
     async def _revise(self, revised: ReviseStart) -> StartRevised:
         record = self._book.record(revised.name)
         class_path = revised.class_path or record.spawn.class_path
-        record.spawn = msgspec.structs.replace(record.spawn, parameters=revised.parameters, class_path=class_path)
+        parameters = (record.spawn.parameters if revised.others_stay else {}) | revised.parameters
+        record.spawn = msgspec.structs.replace(record.spawn, parameters=parameters, class_path=class_path)
         if record.host:
             await self._creators.revise(record.host, record.spawn)
         return StartRevised()

@@ -54,6 +54,7 @@ class Scene:
     def __init__(self, network: LocalNetwork) -> None:
         self.network, self.clock = network, VirtualClock()
         self.told: list[tuple[Any, ...]] = []
+        self.revised: dict[str, tuple[dict[str, Any], bool]] = {}
         self.silent: set[str] = set()
         self.refused: dict[str, Exception] = {}
         self.tokens: dict[str, Any] = {}
@@ -106,8 +107,9 @@ class Scene:
 
     async def place(self, asked: Envelope[Any]) -> Any:
         match asked.body:
-            case ReviseStart(name=name):
+            case ReviseStart(name=name, parameters=parameters, others_stay=others_stay):
                 self.told.append(("revise", name))
+                self.revised[name] = parameters, others_stay
                 return StartRevised()
             case StopComponent(name=name):
                 if name not in self.tokens:
@@ -242,6 +244,17 @@ def test_a_value_goes_to_who_uses_it(scene: Play) -> None:
         await one.change(SetInTree(1, "day", "priority", -2))
         assert ("priority", "day", -2) in one.told
         assert {each[1] for each in one.told if each[0] == "revise"} == {"day", "morning", "noon"}
+
+    scene(body)
+
+
+def test_only_what_the_tree_changes_is_revised_because_the_class_may_be_an_exchanged_one(scene: Play) -> None:
+    async def body(one: Scene) -> None:
+        await one.change(SetInTree(0, "morning", "priority", 2))
+        place = {"path": [["m", 10], ["day", 3], ["morning", 2]], "arc": None, "children": []}
+        assert one.revised["morning"] == (place, True)
+        await one.change(SetInTree(1, "morning", "seconds", 5))
+        assert one.revised["morning"] == (place | {"seconds": 5}, True)
 
     scene(body)
 

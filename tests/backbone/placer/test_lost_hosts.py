@@ -319,6 +319,18 @@ async def test_a_revised_order_is_the_one_that_counts_from_the_next_start_on(one
 
 
 @on("a", "b")
+async def test_an_order_that_is_revised_in_part_keeps_the_rest(one: Mission) -> None:
+    """An exchanged class has parameters of its own, and a change of the tree knows only the mission file's."""
+    await one.start("watcher", "w", host="", parameters={"weight": 0.5, "path": ["m"]})
+    await one.bus.ask(PLACER, ReviseStart("w", {"gain": 2, "path": ["m"]}, "other:Class"), StartRevised, within_s=5.0)
+    await one.bus.ask(PLACER, ReviseStart("w", {"path": ["n"]}, others_stay=True), StartRevised, within_s=5.0)
+    await one.crash("creator-a")
+    await one.clock.sleep_s(10.0)
+    started = one.creators["b"].lives["w"][0]
+    assert (started.parameters, started.class_path) == ({"gain": 2, "path": ["n"]}, "other:Class")
+
+
+@on("a", "b")
 async def test_a_restarted_nameserver_moves_nothing(one: Mission) -> None:
     await one.start("watcher", "w1")
     await one.start("watcher", "w2")
