@@ -15,7 +15,7 @@ import msgspec
 from backbone.component.launch import Launch
 from backbone.creator.decisions import ReportEnded, ReportFell, ReportLeft, ReportReady, ReportStartFailed
 from backbone.creator.failed_starts import start_failed
-from backbone.creator.messages import NotHere, ProcessEnded, RestartPolicy, Spawn, StartFailed
+from backbone.creator.messages import NotHere, ProcessEnded, RestartPolicy, ReviseSpawn, Spawn, StartFailed
 from backbone.waiting import settle
 
 Report = ReportReady | ReportStartFailed | ReportEnded | ReportLeft | ReportFell
@@ -50,18 +50,20 @@ class KeptComponents(dict[str, Kept]):
         for name in self.keys() - set(names):
             del self[name]
 
-    def revise(self, name: str, parameters: dict[str, Any], class_path: str) -> None:
+    def revise(self, revised: ReviseSpawn) -> None:
         """Use these parameters and, if it is given, this class from the next start on.
 
         Raises:
             NotHere: No component of this name is here.
         """
-        kept = self.get(name)
+        kept = self.get(revised.name)
         if kept is None:
-            raise NotHere(f"no component {name} runs here", name=name)
-        class_path = class_path or kept.order.class_path
+            raise NotHere(f"no component {revised.name} runs here", name=revised.name)
+        class_path, parameters = revised.class_path or kept.order.class_path, revised.parameters
         kept.launch = msgspec.structs.replace(kept.launch, parameters=parameters, class_path=class_path)
-        kept.order = msgspec.structs.replace(kept.order, parameters=parameters, class_path=class_path)
+        kept.order = msgspec.structs.replace(
+            kept.order, parameters=parameters, class_path=class_path, declared=revised.declared
+        )
 
     def launch_of(self, name: str) -> Launch | None:
         """Return the launch of a component; None: it is not kept."""

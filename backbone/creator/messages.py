@@ -54,6 +54,13 @@ class RestartPolicy(Message, frozen=True):
     hung_after_s: Duration = 3.0
 
 
+class Declared(Message, frozen=True):
+    """Class and parameters that the mission file declares for a component whose class was exchanged."""
+
+    class_path: Line
+    parameters: Values = {}
+
+
 class Spawn(Message, frozen=True):
     """Start one component here and answer when it is ready. Only the placer asks this.
 
@@ -67,6 +74,7 @@ class Spawn(Message, frozen=True):
         tags: Tags that its host must have.
         process: Name of the shared process; empty: a process of its own.
         alike_most: Most components of its type in one process, where the placer chooses the process; 1: it does not.
+        declared: Class and parameters to use if the component is placed anew; None: these.
     """
 
     subsystem: Subsystem
@@ -81,6 +89,7 @@ class Spawn(Message, frozen=True):
     tags: Annotated[list[Mention], FEW] = []
     process: NameOrNone = ""
     alike_most: Count = 1
+    declared: Declared | None = None
 
 
 class Spawned(Message, frozen=True):
@@ -96,11 +105,13 @@ class ReviseSpawn(Message, frozen=True):
     Attributes:
         parameters: All of them; the running process keeps its own.
         class_path: Class path from its next start on; empty: as before.
+        declared: See ``Spawn``.
     """
 
     name: Name
     parameters: Values
     class_path: Line = ""
+    declared: Declared | None = None
 
 
 class SpawnRevised(Message, frozen=True):

@@ -10,7 +10,7 @@ import asyncio
 import logging
 import os
 from collections.abc import Callable, Coroutine
-from typing import Any, assert_never
+from typing import assert_never
 
 import msgspec
 
@@ -44,6 +44,7 @@ from backbone.creator.messages import (
     ProcessFell,
     ProcessState,
     RestartPolicy,
+    ReviseSpawn,
     Spawn,
     StartFailed,
 )
@@ -162,16 +163,13 @@ class ProcessKeeper:
         except TimeoutError:
             raise self._kept.failed(name, f"was not ready within {within_s:g} s") from None
 
-    def revise(self, name: str, parameters: dict[str, Any], class_path: str = "") -> None:
-        """Start the component with these parameters from its next start on; its running process stays as it is.
-
-        Args:
-            class_path: Class path of the next start; empty: as before.
+    def revise(self, revised: ReviseSpawn) -> None:
+        """Start the component as revised from its next start on; its running process stays as it is.
 
         Raises:
             NotHere: No component of this name is here.
         """
-        self._kept.revise(name, parameters, class_path)
+        self._kept.revise(revised)
 
     # End
     async def end(

@@ -129,10 +129,10 @@ class Creator(Component[CreatorParameters]):
             case Spawn():
                 self._refuse_strangers(asked)
                 return await self._spawn(question)
-            case ReviseSpawn(name=name, parameters=parameters, class_path=class_path):
+            case ReviseSpawn() as revised:
                 self._refuse_strangers(asked)
-                self._keeper.revise(name, parameters, class_path)
-                self.story.note(name, "starts with other parameters from its next start on")
+                self._keeper.revise(revised)
+                self.story.note(revised.name, "starts with other parameters from its next start on")
                 return SpawnRevised()
             case EndProcess(name=name, reason=reason, ask_s=ask_s, term_s=term_s):
                 self._refuse_strangers(asked)

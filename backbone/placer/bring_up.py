@@ -14,6 +14,7 @@ from backbone.errors import LinkError, NoResponder
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.placer.creators import ANSWER_EACH_S, SPAWN_WITHIN_S, Creators, Fate, creator_of
 from backbone.placer.decisions import PlacementPhase, PlacementRecord
+from backbone.placer.exchanged_orders import as_declared
 from backbone.placer.messages import CreatorSilent, NoHost, Started, StoppedMeanwhile
 from backbone.placer.news import News
 from backbone.placer.placement_book import PlacementBook
@@ -64,7 +65,10 @@ class BringUp:
             if record.phase is not PlacementPhase.STARTING:  # it returned with a host that was only cut off
                 return started(record)
             self._note(name, f"goes to {record.host}: {'; '.join(record.reasons)}")
-            spawn = record.spawn
+            spawn = as_declared(record.spawn)
+            if spawn is not record.spawn:
+                self._note(name, f"starts with {spawn.class_path} of the mission file, not {record.spawn.class_path}")
+                record.spawn = spawn
             try:
                 spawned = await self._bus.ask(creator_of(record.host), spawn, Spawned, within_s=SPAWN_WITHIN_S)
                 pid = spawned.pid

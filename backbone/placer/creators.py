@@ -87,7 +87,7 @@ class Creators:
                 self._bus,
                 self._clock,
                 creator_of(host),
-                ReviseSpawn(spawn.name, spawn.parameters, spawn.class_path),
+                ReviseSpawn(spawn.name, spawn.parameters, spawn.class_path, spawn.declared),
                 SpawnRevised,
                 each_s=ANSWER_EACH_S,
                 within_s=ANSWER_WITHIN_S,

@@ -33,6 +33,7 @@ from backbone.naming import legal
 from backbone.placer.bring_up import BringUp
 from backbone.placer.creators import ANSWER_EACH_S, ANSWER_WITHIN_S, SPAWN_WITHIN_S, Creators, creator_of
 from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase, PlacementRecord
+from backbone.placer.exchanged_orders import revised
 from backbone.placer.hosts_file import HostsFile
 from backbone.placer.meetings import Meetings, Work
 from backbone.placer.messages import (
@@ -130,8 +131,8 @@ class Placer(Component[PlacerParameters]):
         match asked.body:
             case Start() as order:
                 return await self._start(order, asked.source)
-            case ReviseStart() as revised:
-                return await self._revise(revised)
+            case ReviseStart() as by:
+                return await self._revise(by)
             case StopComponent(name=name, reason=reason):
                 return await self._stop(name, reason or f"asked by {asked.source}")
             case AskPlacement(name=name):
@@ -209,11 +210,9 @@ class Placer(Component[PlacerParameters]):
             raise NoHost(f"{name}: the component database does not admit it: {error}", name=name) from error
         return admitted.component_type
 
-    async def _revise(self, revised: ReviseStart) -> StartRevised:
-        record = self._book.record(revised.name)
-        class_path = revised.class_path or record.spawn.class_path
-        parameters = (record.spawn.parameters if revised.others_stay else {}) | revised.parameters
-        record.spawn = msgspec.structs.replace(record.spawn, parameters=parameters, class_path=class_path)
+    async def _revise(self, by: ReviseStart) -> StartRevised:
+        record = self._book.record(by.name)
+        record.spawn = revised(record.spawn, by)
         if record.host:
             await self._creators.revise(record.host, record.spawn)
         return StartRevised()

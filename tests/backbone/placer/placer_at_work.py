@@ -84,9 +84,10 @@ class FakeCreator(Component[NoParameters]):
         match asked.body:
             case Spawn() as order:
                 return await self.spawn(order)
-            case ReviseSpawn(name=name, parameters=parameters):
+            case ReviseSpawn(name=name) as revised:
                 order, *life = self.lives[name]
-                self.lives[name] = (msgspec.structs.replace(order, parameters=parameters), *life)
+                given = {"parameters": revised.parameters, "class_path": revised.class_path}
+                self.lives[name] = (msgspec.structs.replace(order, **given, declared=revised.declared), *life)
                 return SpawnRevised()
             case EndProcess(name=name):
                 if name not in self.lives:

@@ -318,16 +318,28 @@ async def test_a_revised_order_is_the_one_that_counts_from_the_next_start_on(one
         await one.bus.ask(PLACER, ReviseStart("v", {}), StartRevised, within_s=5.0)
 
 
-@on("a", "b")
-async def test_an_order_that_is_revised_in_part_keeps_the_rest(one: Mission) -> None:
-    """An exchanged class has parameters of its own, and a change of the tree knows only the mission file's."""
-    await one.start("watcher", "w", host="", parameters={"weight": 0.5, "path": ["m"]})
-    await one.bus.ask(PLACER, ReviseStart("w", {"gain": 2, "path": ["m"]}, "other:Class"), StartRevised, within_s=5.0)
-    await one.bus.ask(PLACER, ReviseStart("w", {"path": ["n"]}, others_stay=True), StartRevised, within_s=5.0)
-    await one.crash("creator-a")
-    await one.clock.sleep_s(10.0)
-    started = one.creators["b"].lives["w"][0]
-    assert (started.parameters, started.class_path) == ({"gain": 2, "path": ["n"]}, "other:Class")
+@pytest.mark.parametrize("restarted", [False, True])
+def test_an_exchanged_class_runs_on_and_one_that_is_placed_anew_has_the_mission_files(restarted: bool) -> None:
+    """No creator starts a class that the mission file does not name, and another host may not have it."""
+
+    @on("a", "b")
+    async def scene(one: Mission) -> None:
+        await one.start("watcher", "w", host="", parameters={"weight": 0.5, "path": ["m"]})
+        exchanged = ReviseStart("w", {"gain": 2, "path": ["m"]}, "other:Class")
+        for revised in (exchanged, ReviseStart("w", {"path": ["n"]}, others_stay=True)):
+            await one.bus.ask(PLACER, revised, StartRevised, within_s=5.0)
+        kept = one.creators["a"].lives["w"][0]
+        assert (kept.class_path, kept.parameters) == ("other:Class", {"gain": 2, "path": ["n"]})
+        if restarted:
+            await one.kill("placer")
+            await one.begin(Placer, "placer")
+            await one.clock.sleep_s(1.0)
+        await one.crash("creator-a")
+        await one.clock.sleep_s(10.0)
+        anew = one.creators["b"].lives["w"][0]
+        assert (anew.class_path, anew.parameters) == ("x:Y", {"weight": 0.5, "path": ["n"]})
+
+    scene()
 
 
 @on("a", "b")
