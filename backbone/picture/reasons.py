@@ -14,8 +14,8 @@ from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, Refusal
 from backbone.mission_log.lines import event_json
-from backbone.mission_log.log import AskPeople, PeopleKnown
-from backbone.mission_log.people import People, screens_of
+from backbone.mission_log.log import AskLog, AskPeople, Log, PeopleKnown
+from backbone.mission_log.people import People, is_console, screens_of
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.naming import component_of, did_you_mean
 from backbone.picture.look import look
@@ -225,16 +225,20 @@ class FoundEvents:
 async def story_of(bus: Bus, text: str, clock: Clock) -> FoundEvents:
     """Ask every component for the events about a name, an address or a message.
 
+    The mission's log adds those of components that have ended.
+
     Raises:
         LinkError: The nameserver did not answer: there is no list of components to ask.
     """
     asked = AskedName.of(text)
     listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
-    picture, stories = await asyncio.gather(
+    picture, logged, stories = await asyncio.gather(
         _seen(bus, clock),
+        _logged(bus, asked),
         asyncio.gather(*(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components)),
     )
-    events = [event for story in stories if isinstance(story, Story) for event in story.events]
+    told = [event for story in stories if isinstance(story, Story) for event in story.events]
+    events = [*told, *(event for event in logged if event not in told)]
     missing = [
         f"{component.address}: {story}"
         for component, story in zip(listing.components, stories, strict=True)
@@ -265,6 +269,17 @@ async def _looked(bus: Bus, clock: Clock) -> MissionPicture:
         return await look(bus, clock.now_s(), rate=clock.rate)
     except (Refusal, LinkError):
         return MissionPicture(bus.mission)
+
+
+async def _logged(bus: Bus, asked: AskedName) -> list[StoryEvent]:
+    """Return the newest events about the name in the mission's log, except those of consoles, which come and go.
+
+    There are none if the launcher does not answer.
+    """
+    if asked.message:
+        return []
+    log = await _or_error(bus, LAUNCHER, AskLog(robot=asked.name, most=STORY_LENGTH), Log)
+    return [event for event in log.events if not is_console(event.where)] if isinstance(log, Log) else []
 
 
 def _question(address: str, asked: AskedName) -> AskStory:

@@ -228,6 +228,22 @@ async def test_an_interrupted_command_says_that_the_exchange_goes_on_and_it_does
             await asyncio.sleep(0.1)
 
 
+@pytest.mark.thorough
+async def test_a_unit_that_is_killed_during_a_trial_is_back_with_the_old_class_and_the_story_tells_it(
+    mission: RunningMission,
+) -> None:
+    async with talk_with(mission) as talk:
+        words = ("swap", "answerer", f"{FILE}:Answerer", "--set", "who=second", "--prove", "60")
+        swapping = asyncio.create_task(command(mission, *words))
+        await talk.until_answered_by("second")
+        os.kill(mission.component("answering")["pid"], signal.SIGKILL)
+        done = await swapping
+        assert (done.returncode, "answering ended" in done.stderr) == (5, True), done.stderr
+        await talk.until_answered_by("first")
+        assert "has to prove itself" in (await command(mission, "story", "answerer")).stdout
+        assert "fell, " in (await command(mission, "story", "answering")).stdout
+
+
 @pytest.mark.alone  # a machine that is full loses messages at 30 Hz without any swap, too
 @pytest.mark.parametrize("mission", rest_thorough(["true", "false"]), indirect=True, ids=["in a thread", "in the loop"])
 @pytest.mark.parametrize("count", [10, pytest.param(MANY, marks=pytest.mark.slow)])

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from backbone.addresses import NAMESERVER
+from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, current_cause
-from backbone.bus.local_bus import LocalNetwork
+from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.messages import (
     Absence,
     AskStory,
@@ -21,6 +21,7 @@ from backbone.component.messages import (
 )
 from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
+from backbone.mission_log.log import AskLog, AskPeople, Log, PeopleKnown
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.picture.reasons import AskedName, FoundEvents, Reasons, reasons_for, story_of
 from backbone.scheduling.views import Why
@@ -82,6 +83,26 @@ def story(text: str, **listing: Any) -> FoundEvents:
         return await story_of(mission(**listing), text, VirtualClock())
 
     return run_virtual(main())
+
+
+def test_a_story_has_the_events_of_components_that_have_ended_and_each_event_once() -> None:
+    """An exchange ends with the process that carries it out, and so does the story of that process."""
+    ended = StoryEvent(1.5, "mission_control/fast", "x:New warms beside x:Old for anna", "scout1", "")
+    other = StoryEvent(1.6, "mission_control/fast", "x:New warms beside x:Old for anna", "scout10", "")
+
+    async def main() -> FoundEvents:
+        bus = mission()
+        assert isinstance(bus, LocalBus)
+
+        async def logs(asked: Any) -> Log | PeopleKnown:
+            if isinstance(asked.body, AskPeople):
+                return PeopleKnown({})
+            return Log([one for one in (EVENTS[0], ended, other) if asked.body.wants(one)])
+
+        bus.network.join(LAUNCHER, VirtualClock()).serve(LAUNCHER, AskLog | AskPeople, logs)
+        return await story_of(bus, "scout1", VirtualClock())
+
+    assert run_virtual(main()).events == [EVENTS[0], ended, EVENTS[1]]
 
 
 def why(text: str) -> Reasons:
