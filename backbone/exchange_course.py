@@ -19,7 +19,7 @@ import msgspec
 
 from backbone.errors import complaint
 from backbone.exchange import Swapped
-from backbone.handed_state import NotConverted, copy_for_present_classes
+from backbone.handed_state import NotConverted, copy_for
 
 T = TypeVar("T")
 UNPROVED = (Exception, SystemExit, KeyboardInterrupt)
@@ -184,7 +184,7 @@ def hand_over(old: object, new: object) -> bool:
     values = {name: getattr(old, name) for name in sorted(names)}
     if any(not _fits(value, getattr(new, name)) for name, value in values.items()):
         return False
-    for name, value in copy_for_present_classes(values).items():  # one copy, so that two attributes share objects
+    for name, value in copy_for(type(new), values).items():  # one copy, so that two attributes share objects
         setattr(new, name, value)
     return True
 

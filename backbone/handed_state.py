@@ -13,7 +13,7 @@ import io
 import pickle
 import sys
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import Enum
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import cast
@@ -24,6 +24,8 @@ from backbone.errors import Refusal
 
 SHARED = (type, FunctionType, BuiltinFunctionType, ModuleType, weakref.ref)
 """Classes of objects that are not copied, as in ``copy.deepcopy``."""
+Files = Mapping[str, Mapping[str, object]]
+"""Name of a file's module → its names and their values."""
 
 
 class NotConverted(Refusal):
@@ -33,8 +35,8 @@ class NotConverted(Refusal):
     remedy = "Let the class be a dataclass with the same fields as before, or expect a fresh state."
 
 
-def copy_for_present_classes(values: dict[str, object]) -> dict[str, object]:
-    """Return a copy of the values in which each object has the present class of its file.
+def copy_for(kind: type, values: dict[str, object]) -> dict[str, object]:
+    """Return a copy of the values in which each object has the class that this class's code knows by its name.
 
     Objects that are shared among the values are shared among the copies, too.
 
@@ -45,7 +47,7 @@ def copy_for_present_classes(values: dict[str, object]) -> dict[str, object]:
     file, shared = io.BytesIO(), list[object]()
     _Writer(file, shared).dump(values)
     file.seek(0)
-    return cast(dict[str, object], _Reader(file, shared).load())
+    return cast(dict[str, object], _Reader(file, shared, _files(kind)).load())
 
 
 class _Writer(pickle.Pickler):
@@ -63,27 +65,38 @@ class _Writer(pickle.Pickler):
 
 
 class _Reader(pickle.Unpickler):
-    """Reads what ``_Writer`` wrote, with present classes."""
+    """Reads what ``_Writer`` wrote, with the classes of these files."""
 
-    def __init__(self, file: io.BytesIO, shared: list[object]) -> None:
+    def __init__(self, file: io.BytesIO, shared: list[object], files: Files) -> None:
         super().__init__(file)
-        self._shared = shared
+        self._shared, self._files = shared, files
 
     def persistent_load(self, number: int) -> object:
         one = self._shared[number]
-        return _present(one) if isinstance(one, type | FunctionType) else one
+        return _present(one, self._files) if isinstance(one, type | FunctionType) else one
 
 
-def _present(one: type | FunctionType) -> object:
-    """Return the class or function of this name that its file declares now.
+def _files(kind: type) -> Files:
+    """Return the files that the class and its base classes were read from.
+
+    ``sys.modules`` is not enough, because the end of another exchange may put an older version of a file there.
+    """
+    known = {name: getattr(module, "__dict__", {}) for name, module in sys.modules.copy().items()}
+    own = {each.__module__: each.__globals__ for base in reversed(kind.__mro__) for each in _own_functions(base)}
+    return known | own
+
+
+def _present(one: type | FunctionType, files: Files) -> object:
+    """Return the class or function that has this name in its file.
 
     Raises:
-        NotConverted: See ``copy_for_present_classes``.
+        NotConverted: See ``copy_for``.
     """
-    found: object = sys.modules.get(one.__module__)
-    for name in one.__qualname__.split("."):
+    first, *inner = one.__qualname__.split(".")
+    found: object = files.get(one.__module__, {}).get(first)
+    for name in inner:
         found = getattr(found, name, None)
-    if found is one or (found is None and not _is_of_old_file(one)):
+    if found is one or (found is None and not _is_of_old_file(one, files)):
         return one
     if found is None:
         raise NotConverted(f"{one.__qualname__} is no longer in its file")
@@ -96,15 +109,15 @@ def _present(one: type | FunctionType) -> object:
     return found
 
 
-def _is_of_old_file(one: type | FunctionType) -> bool:
-    """Return whether the functions of this class, or this function, belong to a file that was read anew since."""
-    functions = [one] if isinstance(one, FunctionType) else _functions(one)
-    now = getattr(sys.modules.get(one.__module__), "__dict__", None)
-    return any(each.__module__ == one.__module__ and each.__globals__ is not now for each in functions)
+def _is_of_old_file(one: type | FunctionType, files: Files) -> bool:
+    """Return whether this function, or the functions of this class, belong to another version of their file."""
+    functions = [one] if isinstance(one, FunctionType) else _own_functions(one)
+    return any(each.__globals__ is not files.get(one.__module__) for each in functions)
 
 
-def _functions(kind: type) -> Iterator[FunctionType]:
-    return (each for each in vars(kind).values() if isinstance(each, FunctionType))
+def _own_functions(kind: type) -> Iterator[FunctionType]:
+    """Return the functions that the class declares in its own file."""
+    return (one for one in vars(kind).values() if isinstance(one, FunctionType) and one.__module__ == kind.__module__)
 
 
 def _fields(kind: type) -> list[tuple[str, str]] | None:

@@ -22,7 +22,7 @@ import msgspec
 
 from backbone.errors import complaint
 from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules
-from backbone.handed_state import copy_for_present_classes
+from backbone.handed_state import copy_for
 from mission_control.modules.module import Module
 from mission_control.modules.ports import type_name
 
@@ -122,7 +122,7 @@ def handed_over(old: Module, new: Module) -> bool:
     if not fields or fields != _fields(new.State):
         return False
     values = {name: getattr(old.state, name) for name in fields}
-    new.state = new.State(**copy_for_present_classes(values))  # one copy, so that two fields still share objects
+    new.state = new.State(**copy_for(type(new), values))  # one copy, so that two fields still share objects
     return True
 
 

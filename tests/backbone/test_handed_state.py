@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from backbone.handed_state import NotConverted, copy_for_present_classes
+from backbone.handed_state import NotConverted, copy_for
 from backbone.reading_anew import ReadAnew
 
 SOURCE = """
@@ -61,7 +61,8 @@ def local():
 
 
 class Part:
-    pass
+    def act(self):
+        return Mark(1)
 """
 
 
@@ -85,7 +86,7 @@ def test_each_object_gets_the_present_class_and_what_is_shared_stays_shared(edit
     mark = old.Mark(7)
     marks = old.Marks(mark, [mark, old.Place(1.5)], {mark: {old.Marks.Kind.SMALL, old.Mark}, "by": old.chosen})
     new = edited("first", "second")
-    copied: Any = copy_for_present_classes({"marks": marks, "same": mark})
+    copied: Any = copy_for(new.Part, {"marks": marks, "same": mark})
     mine = copied["marks"]
     assert type(mine) is new.Marks
     assert (mine.newest.told(), mine.all[1].told(), mine.at["by"]()) == ("second 7", "second place", "second")
@@ -107,16 +108,26 @@ def test_each_object_gets_the_present_class_and_what_is_shared_stays_shared(edit
 )
 def test_what_cannot_be_converted_is_refused_and_named(edited: Any, made: str, old: str, new: str, cause: str) -> None:
     value = eval(f"module.{made}", {"module": edited()})  # noqa: S307  an example of this file
-    edited(old, new)
+    part = edited(old, new).Part
     with pytest.raises(NotConverted, match=cause):
-        copy_for_present_classes({"value": [value]})
+        copy_for(part, {"value": [value]})
 
 
 def test_a_file_that_was_not_read_anew_changes_no_class(edited: Any) -> None:
     module = edited()
     values = {"search": module.Search(), "hidden": module.local(), "by": lambda: 3}
-    copied: Any = copy_for_present_classes(values)
+    copied: Any = copy_for(module.Part, values)
     assert type(copied["search"]) is module.Search
     assert type(copied["hidden"]) is type(values["hidden"])
     assert copied["search"] is not values["search"]
     assert copied["by"] is values["by"]
+
+
+@pytest.mark.parametrize("derived", [False, True])
+def test_the_end_of_another_exchange_of_the_file_changes_no_class(edited: Any, derived: bool) -> None:
+    old = edited()
+    new = edited("first", "second")
+    kind = type("Derived", (new.Part,), {}) if derived else new.Part
+    sys.modules[old.__name__] = old  # as the failure of an exchange that began earlier does
+    copied: Any = copy_for(kind, {"mark": old.Mark(7), "by": old.chosen})
+    assert (copied["mark"].told(), copied["by"]()) == ("second 7", "second")
