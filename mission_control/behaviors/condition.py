@@ -10,6 +10,7 @@ repeatedly.
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import importlib
 import logging
@@ -28,6 +29,7 @@ from backbone.naming import Subsystem, component_of, is_component, is_legal
 from backbone.rc_manager.messages import TraceLine
 from backbone.spoken import value_text
 from backbone.wire import Envelope, Message, plain
+from mission_control.acting import cancel
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.child_keeper import why
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, MotionSeen, WaypointReached
@@ -118,7 +120,7 @@ class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
         below: The field must be a number below this.
         equals: The field must be this.
         mode: wait: success at the first message that is like that. check: the first message decides between success
-            and failure; readings that are not there within 5 s are a failure.
+            and failure; readings that are not there within 5 s of its start or of a change are a failure.
     """
 
     source: Annotated[str, Meta(extra_json_schema={"names": "source"})] = ANY
@@ -149,6 +151,7 @@ class MessageCondition(Behavior[MessageConditionParameters]):
     fixed = Behavior.fixed | {"source", "message"}
     children_allowed = (0, 0)
     may_claim = False
+    _giving_up: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
         """Subscribe to the event, or begin to ask for reports."""
@@ -163,10 +166,13 @@ class MessageCondition(Behavior[MessageConditionParameters]):
         self.bus.subscribe(source, Conversation.EVENTS, known, self._heard)
 
     def parameters_changed(self) -> None:
-        """Use the new comparison from now on."""
+        """Use the new comparison and mode from now on; a check of readings has its whole time again."""
         given = self.parameters
         self._comparison = Comparison(given.field, given.above, given.below, given.equals)
         self.report(f"waits for {given.message} of {given.source}: {self._comparison}")
+        cancel(self._giving_up)
+        if given.mode == "check" and message_class(given.message) is Readings:
+            self._giving_up = self.start_task(self._give_up(component_of(given.source)), "give up")
 
     def _begin_to_ask(self) -> None:
         source = _asked_at(self._kind, self.parameters.source)
@@ -178,8 +184,6 @@ class MessageCondition(Behavior[MessageConditionParameters]):
         rc = component_of(source)
         watch_readings(self.bus, self._judge, rc)
         self.start_task(self._ask(source, functools.partial(ask_readings, self.bus, rc)), "ask")
-        if self.parameters.mode == "check":
-            self.start_task(self._give_up(rc), "give up")
 
     async def _ask(self, source: str, ask: Callable[[], Awaitable[Message]]) -> None:
         """Ask and test the answer repeatedly, until a result is final."""

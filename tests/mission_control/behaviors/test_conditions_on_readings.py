@@ -157,6 +157,32 @@ def test_a_check_waits_for_the_first_readings_and_fails_if_there_are_none(play: 
     play(never)
 
 
+def test_a_check_set_at_run_time_waits_for_the_first_readings_from_then_on(play: Play) -> None:
+    """Otherwise the tree waits for ever for an RC without readings."""
+
+    async def script(scene: Scene) -> None:
+        scene.answer()
+        await scene.begin()
+        assert await scene.after(10.0) == (RUNNING, "")
+        scene.condition.change_parameters({"mode": "check"})
+        assert await scene.after(FIRST_READINGS_S - 0.1) == (RUNNING, "")
+        scene.condition.change_parameters({"below": 0.2})
+        assert await scene.after(FIRST_READINGS_S - 0.1) == (RUNNING, ""), "the new comparison has its whole time"
+        assert await scene.after(0.2) == (FAILURE, "scout1 had no readings within 5 s")
+
+    play(script)
+
+
+def test_a_check_that_is_set_to_wait_waits_for_ever(play: Play) -> None:
+    async def script(scene: Scene) -> None:
+        scene.answer()
+        await scene.begin(mode="check")
+        scene.condition.change_parameters({"mode": "wait"})
+        assert await scene.after(10.0 * FIRST_READINGS_S) == (RUNNING, "")
+
+    play(script)
+
+
 def test_a_value_that_an_rc_does_not_report_is_missing(play: Play) -> None:
     async def script(scene: Scene) -> None:
         scene.measure(0.1)
