@@ -25,6 +25,7 @@ from backbone.component.messages import (
     LogLevel,
     MissionTime,
     OtherIncarnation,
+    ParameterBug,
     Parameters,
     SetParameter,
     Statistics,
@@ -33,7 +34,9 @@ from backbone.component.messages import (
     Story,
     WrongParameter,
 )
+from backbone.component.parameter_values import parameters_from
 from backbone.component.story import StoryBook
+from backbone.errors import Refusal, complaint
 from backbone.ranges import LONGEST_MENTION, MOST_ENTRIES, MOST_MEASURE
 from backbone.spoken import value_text
 from backbone.wire import Envelope, Message
@@ -67,6 +70,9 @@ class Answering(Protocol):
     def end(self, reason: str) -> None:
         """End in good order."""
 
+    def fail(self, bug: BaseException) -> None:
+        """End because of a bug."""
+
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer a question of its own."""
 
@@ -88,6 +94,7 @@ class CommonAnswers:
         Raises:
             OtherIncarnation: The order to stop is for another process.
             WrongParameter: No such parameter, or a value that does not fit.
+            ParameterBug: The component has a bug in ``parameters_changed``, which ends it.
             Refusal: The component refuses the value or the question.
         """
         component = self._component
@@ -145,10 +152,25 @@ class CommonAnswers:
                 remedy="Start it again with the new value: a behavior by 'scout-backbone tree replace', "
                 "a console by its options.",
             )
-        component.change_parameters({name: value})
+        try:
+            component.change_parameters({name: value})
+        except Refusal:
+            raise
+        except Exception as bug:  # it ends the component as any bug, but the requester learns why
+            component.fail(bug)
+            raise ParameterBug(self._consequence(bug, name, value)) from bug
         component.story.note(name, f"{user} set {name} from {value_text(old[name])} to {value_text(value)}")
         return Parameters(msgspec.to_builtins(component.parameters))
 
+    def _consequence(self, bug: Exception, name: str, value: object) -> str:
+        """Return what failed, where, and which value holds afterwards."""
+        component = self._component
+        at_start = parameters_from(component.launch.parameters, type(component.parameters))
+        again = value_text(msgspec.to_builtins(at_start)[name])
+        return (
+            f"{component.launch.name} has a bug that ends it when {name} is {value_text(value)}: {complaint(bug)}; "
+            f"if it is started again, {name} is {again}"
+        )
 
 def is_measure(name: object, value: object) -> bool:
     """Return whether a message can hold this statistic.

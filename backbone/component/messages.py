@@ -259,4 +259,11 @@ class WrongParameter(Refusal):
     remedy = "Use a parameter of its class with a value of its type; 'scout-backbone set NAME' lists those of NAME."
 
 
+class ParameterBug(Refusal):
+    """The component failed when it applied the value, and ends; a new process has the value of its start."""
+
+    code = "component.parameter_bug"
+    remedy = "Mend parameters_changed of its class; 'scout-backbone story NAME' shows whether NAME was started again."
+
+
 CommonQuestion = AskState | AskTime | AskStatistics | AskParameters | SetParameter | AskStory | Stop

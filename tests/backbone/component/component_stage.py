@@ -90,6 +90,8 @@ class Walker(Component[Gait]):
     def parameters_changed(self) -> None:
         if self.parameters.slope > 1.0:
             raise TooSteep(f"{self.parameters.slope}")
+        if self.stumble == "change":
+            raise self.by or KeyError("change")
         self.diary.append(f"step {self.parameters.step_s:g} s")
 
     def statistics(self) -> dict[str, float]:

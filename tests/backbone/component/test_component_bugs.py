@@ -13,6 +13,9 @@ from component_stage import TOWER, Poke, Poked, Stage, TooSteep, live
 from backbone.component.component import CALM_S, DRAIN_WITHIN_S
 from backbone.component.messages import (
     LifeState,
+    ParameterBug,
+    Parameters,
+    SetParameter,
 )
 from backbone.component.own_tasks import TASKS_END_WITHIN_S
 from backbone.component.process import EXIT_REFUSED, cause_in_log, exit_code_of, refusal_in_log
@@ -50,6 +53,25 @@ def test_a_bug_in_a_hook_ends_it_failed_and_is_raised(
 
     with caplog.at_level(logging.CRITICAL):
         live(law())
+
+
+def test_a_bug_in_a_change_ends_it_and_the_requester_learns_why() -> None:
+    """Otherwise ``set`` says that no component answered, and not which value holds."""
+    bug = "walker has a bug that ends it when step_s is 2.0: KeyError: 'change' ("
+    afterwards = "); if it is started again, step_s is 0.5"
+
+    async def law() -> None:
+        stage = Stage(stumble="change")
+        life = await stage.begin()
+        with pytest.raises(ParameterBug) as refused:
+            await stage.ask(SetParameter("step_s", 2.0), Parameters)
+        first, place, last = refused.value.detail.partition("component_stage.py, line ")
+        assert (first[: len(bug)], place != "", last[-len(afterwards) :]) == (bug, True, afterwards)
+        with pytest.raises(KeyError, match="change"):
+            await life
+        assert stage.states[-1].state is LifeState.FAILED
+
+    live(law())
 
 
 class Panic(BaseException):
