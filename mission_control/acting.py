@@ -16,6 +16,7 @@ from backbone.bus.interface import Clock
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, OutcomeUnknown
 from mission_control.behavior_hooks import BehaviorHooks
+from mission_control.behavior_tree import BehaviorNode
 from mission_control.child_keeper import AGAIN_AFTER_S
 from mission_control.gated_bus import GatedBus
 from mission_control.messages import BehaviorStatus
@@ -33,6 +34,7 @@ class Actor(Protocol):
     clock: Clock
     status: BehaviorStatus
     feedback: str
+    child_nodes: dict[str, BehaviorNode]
 
     @property
     def name(self) -> str:
@@ -61,7 +63,7 @@ class Acting:
     """
 
     def __init__(self, actor: Actor, hooks: BehaviorHooks) -> None:
-        self.resumes_again = False
+        self.resumes_again = self._has_told = False
         self._actor, self._hooks, self._clock = actor, hooks, actor.clock
         self._task: asyncio.Task[None] | None = None
 
@@ -98,7 +100,8 @@ class Acting:
                 if self.resumes_again:
                     await self._hooks.resumed(arc.granted.rcs if arc.granted is not None else {})
                     self.resumes_again = False
-                return await self._hooks.act()
+                await self._hooks.act()
+                return self._note_return()
             except (SwappedOut, StaleEpoch) as refusal:  # the grant ended first; ``resumed`` begins the next turn
                 log.info("%s stopped acting: %s", self._actor.name, refusal.detail)
                 return None
@@ -108,6 +111,21 @@ class Acting:
                 await self._wait_until_it_may_move(arc, stopped)
                 continue
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+
+    def _note_return(self) -> None:
+        """Report an ``act`` after which only the end of the grant takes the robot away; once in its story.
+
+        A class that overrides ``see`` may finish at a picture, and a parent after its children: neither is reported.
+        """
+        kind, actor = type(self._hooks), self._actor
+        finishes_later = kind.see is not BehaviorHooks.see or actor.child_nodes
+        if kind.act is BehaviorHooks.act or finishes_later or actor.status.is_final or not actor.gate.is_open:
+            return
+        returned = "act has returned without finish, so the behavior keeps its RCs"
+        actor.report(f"{actor.feedback}; {returned}")
+        if not self._has_told:
+            actor.publish_event(actor.name, returned, LogLevel.WARNING)
+        self._has_told = True
 
     async def _wait_until_it_may_move(self, arc: ArcClient, stopped: EmergencyStopped) -> None:
         """Report the stop, and wait until it is lifted or its state is unknown."""

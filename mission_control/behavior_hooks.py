@@ -65,7 +65,8 @@ class BehaviorHooks:
         What: await ``self.arc`` commands and the clock, keep progress on ``self``. If a command is too late for the
         grant, the task ends without an error. After a ``LinkError`` or ``OutcomeUnknown`` it begins again; after an
         operator's stop it begins again when that stop is lifted.
-        Not: catch the cancellation and continue.
+        Not: catch the cancellation and continue; return without ``finish``, because the behavior then keeps
+        its RCs; only a class that overrides ``see``, or a parent, may finish later.
         """
 
     async def suspending(self, deadline_s: float) -> None:

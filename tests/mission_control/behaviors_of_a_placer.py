@@ -94,6 +94,27 @@ class Stubborn(Driver):
             await self.clock.sleep_s(0.5)
 
 
+class Forgetful(Behavior[Any]):
+    """Returns without ``finish``."""
+
+    async def act(self) -> None:
+        self.report("waves")
+
+
+class Seer(Forgetful):
+    """Finishes at a picture."""
+
+    def see(self, frame: Frame) -> None:
+        self.finish(BehaviorStatus.SUCCESS)
+
+
+class Finisher(Behavior[Any]):
+    """Finishes at the end of ``act``."""
+
+    async def act(self) -> None:
+        self.finish(BehaviorStatus.SUCCESS)
+
+
 class Spectator(Behavior[Any]):
     """Only looks."""
 
@@ -106,6 +127,9 @@ CLASSES: dict[str, type[Component[Any]]] = {
     "driver": Driver,
     "starter": Starter,
     "stubborn": Stubborn,
+    "forgetful": Forgetful,
+    "seer": Seer,
+    "finisher": Finisher,
 }
 
 

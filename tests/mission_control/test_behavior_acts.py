@@ -192,3 +192,25 @@ def test_an_act_that_goes_on_after_its_cancellation_is_told_with_its_place(
         assert told == [f"act goes on after its cancellation {place}"] * times
 
     placer_world(scene)
+
+
+@pytest.mark.parametrize(("kind", "is_told"), [("forgetful", True), ("seer", False), ("finisher", False)])
+def test_an_act_that_returns_without_finish_is_told(placer_world: Run, kind: str, is_told: bool) -> None:
+    """Otherwise the behavior keeps its robot for no visible reason."""
+    returned = "act has returned without finish, so the behavior keeps its RCs"
+
+    async def scene(placer: FakePlacer) -> None:
+        own = await root(placer, node("own", kind, arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["own-capture"]
+        await arc.grant()
+        await placer.clock.sleep_s(1.0)
+        assert (own.feedback == f"waves; {returned}") is is_told
+        if is_told:
+            await arc.suspend()
+            await arc.grant()
+            await placer.clock.sleep_s(1.0)
+            assert own.feedback == f"waves; {returned}", "in each turn"
+        assert [event.what for event in own.story.of("own")].count(returned) == is_told, "once in the log"
+
+    placer_world(scene)
