@@ -182,7 +182,13 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         return self.own_arc.suspended_because if self.arc is not None else self._children.rules.suspended_because
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
-        """Finish: release the ARC, end the children, report to the parent. Later calls change nothing."""
+        """Finish: release the ARC, end the children, report to the parent. Later calls change nothing.
+
+        Raises:
+            TypeError: The status is no ``BehaviorStatus``.
+        """
+        if not isinstance(status, BehaviorStatus):
+            raise TypeError(f"finish({status!r}): write BehaviorStatus.SUCCESS or BehaviorStatus.FAILURE")
         if self.status.is_final or not status.is_final or not self.exchanges.may_finish(self, status, payload or {}):
             return
         self.status, self.payload = status, dict(payload or {})

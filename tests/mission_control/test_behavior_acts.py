@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
@@ -212,5 +213,15 @@ def test_an_act_that_returns_without_finish_is_told(placer_world: Run, kind: str
             await placer.clock.sleep_s(1.0)
             assert own.feedback == f"waves; {returned}", "in each turn"
         assert [event.what for event in own.story.of("own")].count(returned) == is_told, "once in the log"
+
+    placer_world(scene)
+
+
+def test_a_word_as_status_is_a_bug_with_what_to_write(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        own = await root(placer, node("own", "driver", arc=ARC))
+        written = "finish('success'): write BehaviorStatus.SUCCESS or BehaviorStatus.FAILURE"
+        with pytest.raises(TypeError, match=re.escape(written)):
+            own.finish("success")
 
     placer_world(scene)
