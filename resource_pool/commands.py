@@ -101,7 +101,7 @@ def clipped(order: Command, limits: Mapping[str, tuple[float, float]]) -> dict[s
 
 
 class Move(Command, frozen=True):
-    """Move forward and turn at these speeds from now on, until another command or ``COMMAND_TIMEOUT_S``.
+    """Move forward and turn at these speeds until another command, at most for 0.5 s.
 
     Every kind of robot that moves obeys it.
 
@@ -117,7 +117,7 @@ class Move(Command, frozen=True):
 
 
 class Drive(Command, frozen=True, tag="Drive/2"):
-    """Turn the wheels at these speeds from now on, until another command or ``COMMAND_TIMEOUT_S``.
+    """Turn the wheels at these speeds until another command, at most for 0.5 s.
 
     Attributes:
         left_rad_s: Left wheel, forward is positive.

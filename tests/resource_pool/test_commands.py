@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import msgspec
@@ -12,10 +13,11 @@ from pool_on_local_network import TwoLampsArc, a_pool
 
 from backbone.bus.clock import run_virtual
 from backbone.component.abilities import UNLIMITED, ValueKind, unit_of
+from backbone.component.field_docs import first_sentence
 from backbone.wire import Message, UnknownMessage
 from resource_pool.arcs.drive import DriveArc
 from resource_pool.commands import Command, Drive, Halt, Jump, Move, SwitchTransmitter, WrongCommand, command_of
-from resource_pool.messages import NoSuchAction, SwappedOut
+from resource_pool.messages import COMMAND_TIMEOUT_S, NoSuchAction, SwappedOut
 from resource_pool.rcs.scout import MOST_M_S, Scout
 from resource_pool.rcs.skeleton import Lamp, Shine
 from scout_model.scout import wheels_rad_s
@@ -29,6 +31,14 @@ commands = st.one_of(
     st.builds(SwitchTransmitter, st.booleans(), st.text(max_size=20)),
     st.builds(Shine, st.floats(0, 1)),
 )
+
+
+def test_no_description_for_people_names_a_constant_of_the_code() -> None:
+    """``components --type scout`` prints the first sentences; a person cannot look 'COMMAND_TIMEOUT_S' up."""
+    sentences = {kind: first_sentence(kind) for kind in KINDS}
+    assert [one for one in sentences.values() if re.search(r"[A-Z]{2}", one)] == []
+    for kind in (Move, Drive):
+        assert sentences[kind].endswith(f"until another command, at most for {COMMAND_TIMEOUT_S:g} s")
 
 
 @given(commands, st.text(max_size=8), st.integers(0, 9))
