@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
-from backbone.creator.messages import Spawned, StartFailed
+from backbone.creator.messages import Spawned, StartFailed, creator_name
 from backbone.errors import LinkError, NoResponder
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.placer.creators import ANSWER_EACH_S, SPAWN_WITHIN_S, Creators, Fate, creator_of
@@ -111,7 +111,7 @@ class BringUp:
             await self._news.or_at(until_s)
 
     async def _choose(self, record: PlacementRecord) -> None:
-        """Choose a host unless the component has returned; if only a creator's return makes one possible, wait for it.
+        """Choose a host unless the component has returned; if a creator makes one possible soon, wait for it.
 
         Raises:
             NoHost: No host is possible.
@@ -122,12 +122,25 @@ class BringUp:
             try:
                 self._book.choose(name, self._clock.now_s())
             except NoHost as refusal:
-                if not (self._is_meeting() or self._book.may_find_host(name)) or self._clock.now_s() >= until_s:
+                may_come = self._is_meeting() or self._book.may_find_host(name)
+                if self._clock.now_s() >= until_s or not (may_come or await self._appears(record.pin)):
                     raise
+                if not may_come and self._book.is_alive(record.pin):  # the placer has met it during the question
+                    continue
                 self._note(name, f"waits for a creator: {refusal.detail}")
                 await self._news.or_at(until_s)
             else:
                 return
+
+    async def _appears(self, host: str) -> bool:
+        """Return whether the nameserver knows the creator of this host, which the book then soon knows, too."""
+        if not host or any(host == view.name for view in self._book.hosts()):
+            return False
+        try:
+            await self._bus.ask(NAMESERVER, Resolve(creator_name(host)), Resolved, within_s=ANSWER_EACH_S)
+        except (UnknownName, LinkError):
+            return False
+        return True
 
     def _named(self, refusal: StartFailed, host: str) -> StartFailed:
         """Return the refusal with the name of its host, unless the mission has one host only."""

@@ -241,8 +241,8 @@ def test_a_machine_that_is_offered_takes_components_and_leaves_nothing_when_it_i
     offered = subprocess.Popen([str(BIN / "scout-backbone"), *words], env=mission.environment, stderr=subprocess.PIPE)
     try:
         wait_for(lambda: "creator-field" in names(mission), "the creator is there", mission)
-        start = ("start", "video_frequency", "--name", "video7", "--host", "field")
-        wait_for(lambda: asked(mission, *start).returncode == 0, "the placer has met the creator", mission)
+        done = asked(mission, "start", "video_frequency", "--name", "video7", "--host", "field")
+        assert done.returncode == 0, done.stderr
         assert mission.component("video7")["host"] == "field"
     finally:
         offered.send_signal(signal.SIGINT)

@@ -144,7 +144,7 @@ class Mission:
         self._lives: dict[str, tuple[Component[Any], asyncio.Task[None]]] = {}
 
     async def begin(self, kind: type[Component[Any]], name: str, host: str = "a", **more: Any) -> Component[Any]:
-        type_name = "creator" if kind is FakeCreator else name
+        type_name = "creator" if issubclass(kind, FakeCreator) else name
         parameters = more.pop("parameters", {})
         launch = Launch("local", Subsystem.BACKBONE, name, type_name, "x:Y", host, "", 0.0, 1.0, parameters)
         if kind is Placer:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from typing import Any
 
 import msgspec
 import pytest
-from placer_at_work import Mission, on
+from placer_at_work import FakeCreator, Mission, on
 
 from backbone.addresses import PLACER
 from backbone.component.messages import (
@@ -23,6 +24,7 @@ from backbone.creator.messages import (
 )
 from backbone.keys import Conversation
 from backbone.naming import IllegalName
+from backbone.placer.bring_up import CREATOR_BACK_S
 from backbone.placer.messages import (
     AskPlacement,
     Ended,
@@ -98,6 +100,32 @@ async def test_refusals_name_the_fault_and_leave_nothing_behind(one: Mission) ->
     assert (await one.start("watcher", "w")).host == "a"
     counted = await one.bus.ask(PLACER, AskStatistics(), Statistics, within_s=1.0)
     assert (counted.values["starts"], counted.values["starts_refused"]) == (6.0, 5.0)
+
+
+class SlowCreator(FakeCreator):
+    """Is registered some time before it is ready."""
+
+    def __init__(self, *arguments: Any, connects_in_s: float) -> None:
+        super().__init__(*arguments, tags=[])
+        self.connects_in_s = connects_in_s
+
+    async def connect(self) -> None:
+        await self.clock.sleep_s(self.connects_in_s)
+
+
+@on("a")
+async def test_a_start_on_a_host_whose_creator_just_appeared_waits_until_the_placer_has_met_it(one: Mission) -> None:
+    one.creators["b"] = await one.begin(SlowCreator, "creator-b", "b", connects_in_s=0.5)
+    assert (await one.start("watcher", host="b")).host == "b"
+
+
+@on("a")
+async def test_a_creator_that_does_not_become_ready_is_waited_for_for_a_bounded_time(one: Mission) -> None:
+    one.creators["b"] = await one.begin(SlowCreator, "creator-b", "b", connects_in_s=2.0 * CREATOR_BACK_S)
+    asked_s = one.clock.now_s()
+    with pytest.raises(NoHost, match="b is no host"):
+        await one.start("watcher", host="b")
+    assert one.clock.now_s() - asked_s < CREATOR_BACK_S + 1.0
 
 
 @on("a")
