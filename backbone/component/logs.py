@@ -2,7 +2,8 @@
 
 The log file is a process's standard output and error, so it also holds the last output of the interpreter and of C
 libraries. When the file has grown beyond ``LOG_BYTES``, it is renamed to ``NAME.log.1``, which replaces an older one,
-and the process redirects its descriptors to a new file.
+and the process redirects its descriptors to a new file. Log records go through a descriptor of their own, so that a
+component may close standard error, and use its number for another file.
 
 Each process holds a lock on its log, so a starting process distinguishes logs of living and of ended components. The
 newest ``ENDED_KEPT`` logs of ended components stay. A line that cannot be written is lost; no process ends because of
@@ -58,7 +59,7 @@ def redirect(run_directory: str, name: str) -> None:
     os.dup2(nothing, 0)
     os.close(nothing)
     if run_directory:
-        _turn_output_to(open_log(run_directory, name))
+        _turn_output_to(open_log(run_directory, name), 1, 2)
 
 
 class ComponentLog(logging.Handler):
@@ -73,6 +74,9 @@ class ComponentLog(logging.Handler):
         self.setFormatter(logging.Formatter(f"%(asctime)s %(levelname)s {name} %(name)s: %(message)s"))
         path = log_path(run_directory, name)
         self._path = path if run_directory and is_at(2, path) else None
+        self._output = 2
+        with contextlib.suppress(OSError):  # a command that was started without standard error
+            self._output = os.dup(2)
         self._repeats = Repeats()
         self._unlooked_bytes = 0
 
@@ -104,6 +108,9 @@ class ComponentLog(logging.Handler):
     def close(self) -> None:
         """Write the counts of repeated records; called at the end of the process."""
         self._tell(self._repeats.rest())
+        if self._output != 2:
+            os.close(self._output)
+            self._output = 2
         super().close()
 
     def _tell(self, lines: list[str]) -> None:
@@ -114,9 +121,10 @@ class ComponentLog(logging.Handler):
         line = printable_lines(text, LINE_BYTES).encode()
         if len(line) > LINE_BYTES:
             line = line[:LINE_BYTES] + f"... ({len(line)} bytes)".encode()
-        with contextlib.suppress(OSError):  # a full disk: the line is lost
+        with contextlib.suppress(OSError, ValueError):  # a full disk, or a stream that was closed
             sys.stderr.flush()
-            write_all(2, line + b"\n")
+        with contextlib.suppress(OSError):  # a full disk: the line is lost
+            write_all(self._output, line + b"\n")
         self._unlooked_bytes += len(line)
         if self._unlooked_bytes >= LOOK_EVERY_BYTES:
             self._keep_small()
@@ -126,18 +134,22 @@ class ComponentLog(logging.Handler):
         if self._path is None:
             return
         with contextlib.suppress(OSError):  # the folder is gone, or the disk is full: tried again later
-            if os.fstat(2).st_size <= LOG_BYTES:
+            if os.fstat(self._output).st_size <= LOG_BYTES:
                 return
-            if is_at(2, self._path):
+            if is_at(self._output, self._path):
                 os.replace(self._path, f"{self._path}{_OLD}")
             elif not self._path.exists():  # the file was removed
-                os.ftruncate(2, 0)
+                os.ftruncate(self._output, 0)
                 return
             try:
-                _turn_output_to(_open(self._path))
+                _turn_output_to(_open(self._path), *self._descriptors())
             except OSError:
-                os.ftruncate(2, 0)
+                os.ftruncate(self._output, 0)
                 raise
+
+    def _descriptors(self) -> list[int]:
+        """Return the descriptors of this log; the component may have opened a file of its own at 1 or 2."""
+        return [one for one in (1, 2) if _is_same(one, self._output)] + [self._output]
 
 
 def tidy(folder: Path, now_s: float | None = None) -> None:
@@ -207,11 +219,19 @@ def _open(path: Path) -> int:
     return opened_locked(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600, lock_together)
 
 
-def _turn_output_to(descriptor: int) -> None:
-    """Redirect standard output and error to the descriptor, and close it."""
+def _is_same(one: int, other: int) -> bool:
+    """Return whether both descriptors are open at one file."""
+    try:
+        return os.path.sameopenfile(one, other)
+    except OSError:  # the component closed it
+        return False
+
+
+def _turn_output_to(descriptor: int, *outputs: int) -> None:
+    """Redirect these descriptors to the descriptor, and close it."""
     with contextlib.suppress(OSError, ValueError):  # a full disk, or a stream that was closed
         sys.stdout.flush()
         sys.stderr.flush()
-    os.dup2(descriptor, 1)
-    os.dup2(descriptor, 2)
+    for output in outputs:
+        os.dup2(descriptor, output, inheritable=output <= 2)
     os.close(descriptor)

@@ -80,6 +80,26 @@ def test_a_process_follows_when_another_life_of_its_name_began_a_new_file(tmp_pa
 
 
 @pytest.mark.processes
+def test_a_file_of_the_component_at_descriptor_2_gets_no_line_of_the_log(tmp_path: Path) -> None:
+    """As after a constructor that closed the descriptor: its cause would be lost, and its file spoiled."""
+    logs = log_folder(tmp_path)
+    program = f"""
+os.close(2)
+own = open('{tmp_path}/own', 'wb', buffering=0)
+assert own.fileno() == 2
+log.error('the cause')
+os.write(1, b"x" * {LOG_BYTES + 1})
+kept.look_after()
+log.error('in the new file')
+own.write(b'own')
+"""
+    assert run(tmp_path, program) == 0
+    assert (tmp_path / "own").read_bytes() == b"own"
+    assert "the cause" in (logs / "scout1.log.1").read_text()
+    assert "in the new file" in (logs / "scout1.log").read_text()
+
+
+@pytest.mark.processes
 def test_a_full_disk_ends_nothing(tmp_path: Path) -> None:
     log_folder(tmp_path)
     program = (
