@@ -13,13 +13,16 @@ from backbone.component.story import LENGTH as STORY_LENGTH
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, Refusal
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.lines import event_json
 from backbone.mission_log.log import AskLog, AskPeople, Log, PeopleKnown
 from backbone.mission_log.people import People, is_console, screens_of
+from backbone.module_waits import AskModule, ModuleWaits
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.naming import component_of, did_you_mean
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
+from backbone.picture.module_reasons import module_lines, modules_of
 from backbone.picture.words import RULES, absence_line, stop_line
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.printable import printable_all
@@ -45,7 +48,7 @@ class Reasons:
         component: The component's own report, if there is one.
         absence: Its absence, if it is wanted and absent.
         led_to: If the name is the id of a message: the events that the message led to.
-        remarks: Further facts about a host, about a person, or about a message that led to nothing.
+        remarks: Further facts about a host, about a person, about a module, or about a message that led to nothing.
         people: The person at each console; the answer names persons.
     """
 
@@ -155,6 +158,8 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
     )
     told = await story_of(bus, text, clock) if asked.message else FoundEvents(())
     remarks = [*host_remarks(name, picture), *person_remarks(name, picture)]
+    if not isinstance(resolved, Resolved):
+        remarks += await _module_remarks(bus, name, picture)
     if asked.message and not told.events:
         remarks.append(
             f"no component has an event that {asked.message} led to; each keeps its newest {STORY_LENGTH} events"
@@ -175,6 +180,23 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         errors = [one for one in (why, placement, resolved) if isinstance(one, Refusal | LinkError)]
         raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), errors[-1])
     return printable_all(reasons)
+
+
+async def _module_remarks(bus: Bus, name: str, picture: MissionPicture) -> list[str]:
+    """Return what the module of this name waits for; none if no execution unit of the mission has it."""
+    units = [state for state in picture.components.values() if state.type == EXECUTION_UNIT]
+    answers = await asyncio.gather(*(_or_error(bus, state.address, AskModule(name), ModuleWaits) for state in units))
+    silent = {absence.name: absence_line(absence, picture.at_s) for absence in picture.health.absent}
+    for state, waits in zip(units, answers, strict=True):
+        if isinstance(waits, ModuleWaits):
+            return module_lines(name, state, waits, picture.components)
+        if isinstance(waits, LinkError):
+            silent.setdefault(component_of(state.address), str(waits))
+    ordered = {process.spawn.name: process.spawn for process in picture.processes.values()}
+    for unit, why in silent.items():
+        if unit in ordered and name in modules_of(ordered[unit]):
+            return [f"{name} is a module of {unit}, which does not run it", f"  {why}"]
+    return []
 
 
 def host_remarks(name: str, picture: MissionPicture) -> list[str]:

@@ -95,6 +95,7 @@ class _Slot:
 @dataclass(slots=True)
 class _Input:
     port: Port
+    key: str
     slot: _Slot
     seen: int = 0
 
@@ -115,12 +116,19 @@ class _Seat:
     """Raises if what ``update`` returned are no outputs: others would get it as it is."""
     times: ModuleTimes = field(default_factory=ModuleTimes)
 
+    def lacks(self) -> list[_Input]:
+        """Return the inputs that the module waits for: all missing required ones, else the fresh ones if none is there.
+
+        The module runs if the list is empty.
+        """
+        if missing := [one for one in self.inputs if one.port.is_required and not one.is_there]:
+            return missing
+        fresh = [one for one in self.inputs if not one.port.is_latest]
+        return [] if any(one.is_there for one in fresh) else fresh
+
     def taken(self) -> dict[str, object] | None:
         """Return the present inputs and mark them as seen; None: the module does not run."""
-        fresh = [one for one in self.inputs if not one.port.is_latest]
-        if not all(one.is_there for one in self.inputs if one.port.is_required):
-            return None
-        if fresh and not any(one.is_there for one in fresh):
+        if self.lacks():
             return None
         given = {one.port.name: one.slot.value for one in self.inputs if one.is_there}
         for one in self.inputs:
@@ -131,6 +139,20 @@ class _Seat:
         """Return key → value of what is in the outputs."""
         self.judge(outputs)
         return {key: value for name, key in self.outputs if (value := getattr(outputs, name)) is not None}
+
+
+class Waits(NamedTuple):
+    """What a module waits for.
+
+    Attributes:
+        runs: Number of its runs.
+        keys: Key → True if the module has had an earlier value; empty: it runs in the next round.
+        needs_all: True: it needs all of them; False: one is enough.
+    """
+
+    runs: int
+    keys: dict[str, bool]
+    needs_all: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +230,7 @@ class ExecutionUnit:
         self._overwritten: dict[str, int] = {}
 
     def _seat(self, member: Member, module: Module) -> _Seat:
-        inputs = [_Input(port, self._slot(key)) for key, port in member.keyed_inputs]
+        inputs = [_Input(port, key, self._slot(key)) for key, port in member.keyed_inputs]
         outputs = [(port.name, key) for key, port in member.keyed_outputs]
         for _name, key in outputs:
             self._slot(key)
@@ -236,6 +258,15 @@ class ExecutionUnit:
             self._overwritten[key] = self._overwritten.get(key, 0) + overwritten
         slot.put(value)
         return self._schedule.arrived(key)
+
+    def waits(self, module: str) -> Waits | None:
+        """Return what the module waits for; None: the unit has no such module."""
+        for seat in self._seats:
+            if seat.name == module:
+                lacks = seat.lacks()
+                needs_all = any(one.port.is_required for one in lacks)
+                return Waits(seat.times.runs, {one.key: one.slot.number > 0 for one in lacks}, needs_all)
+        return None
 
     def tick(self, now_s: float) -> bool:
         """Return whether a round is due because of the time."""

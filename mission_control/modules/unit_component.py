@@ -22,9 +22,10 @@ from backbone.component.launch import Launch
 from backbone.component.messages import WrongParameter
 from backbone.debug_views import ListViews, LookAt
 from backbone.errors import Refusal
-from backbone.exchange import SwapModule
+from backbone.exchange import SwapModule, UnknownModule
 from backbone.keys import Conversation
 from backbone.mission.arranged import Arranged, UnitsQuestion
+from backbone.module_waits import AskModule, AwaitedInput, ModuleWaits
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.debug_views import DebugViews
 from mission_control.modules.arrangement import judged
@@ -54,7 +55,7 @@ class UnitComponent(Component[UnitParameters]):
     parameters_type = UnitParameters
     shares_process = False
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(UnitParameters.__struct_fields__)
-    accepts: ClassVar[Accepts | None] = ListViews | LookAt | SwapModule
+    accepts: ClassVar[Accepts | None] = ListViews | LookAt | SwapModule | AskModule
 
     @classmethod
     def arrange(cls, question: UnitsQuestion) -> Arranged:
@@ -127,8 +128,10 @@ class UnitComponent(Component[UnitParameters]):
                 self._run(now_s)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer questions for debug views, and exchange a module."""
+        """Answer questions for debug views and modules, and exchange a module."""
         match asked.body:
+            case AskModule(module=module):
+                return self._module_waits(module)
             case SwapModule() as swap:
                 return await self._exchanges.swap(swap)
             case ListViews():
@@ -137,6 +140,16 @@ class UnitComponent(Component[UnitParameters]):
                 return self._views.look(look)
             case _:
                 raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
+
+    def _module_waits(self, module: str) -> ModuleWaits:
+        waits = self._unit.waits(module)
+        if waits is None:
+            raise UnknownModule(f"{self.name} has no module {module!r}")
+        makers = {key: one.name for one in self._graph.units[self.name] for key, _port in one.keyed_outputs}
+        sources = {key: source.address for key, source in self.parameters.sources.items()} | makers
+        late, keys = self._deadlines.late, waits.keys.items()
+        awaited = [AwaitedInput(key, sources[key], has_come, key in late) for key, has_come in keys]
+        return ModuleWaits(waits.runs, awaited, waits.needs_all)
 
     def parameters_changed(self) -> None:
         """Choose sources; no other parameter can change at run time.

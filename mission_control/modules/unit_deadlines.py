@@ -37,9 +37,14 @@ class UnitDeadlines:
         self._recurring, self._late_s = Recurring(CALM_S * component.clock.rate), dict[str, float]()
 
     @property
+    def late(self) -> Collection[str]:
+        """The keys that are late at present."""
+        return self._deadlines.late
+
+    @property
     def text(self) -> str:
         """The keys that are late at present, as text; empty: no key is late."""
-        late = [f"no {key} from {self._sources[key].address}" for key in self._deadlines.late]
+        late = [f"no {key} from {self._sources[key].address}" for key in self.late]
         return ", ".join(late)
 
     def met(self, key: str) -> None:

@@ -23,7 +23,9 @@ from backbone.component.messages import (
     WrongParameter,
 )
 from backbone.debug_views import ListViews, Views
+from backbone.exchange import UnknownModule
 from backbone.keys import Conversation
+from backbone.module_waits import AskModule, AwaitedInput, ModuleWaits
 from backbone.quality import QUALITY, OutputQuality, Urgency
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 from mission_control.modules.arrangement import UnitOrder, arranged
@@ -112,6 +114,27 @@ def test_a_frequency_is_kept_and_counted(local_mission: Any, beside: Any, own_th
     counter = ModuleOrder("counter", "sample_modules:Counter", {"step": 3.0})
     order = UnitOrder(name="one", frequency_hz=20.0, modules=[counter], own_thread=own_thread)
     play(local_mission, beside, arranged([order], {}), scene)
+
+
+@pytest.mark.parametrize("own_thread", [False, True])
+def test_a_module_that_waits_names_the_inputs_that_it_waits_for(
+    local_mission: Any, beside: Any, own_thread: bool
+) -> None:
+    async def scene(bus: Bus, _started: dict[str, UnitComponent]) -> None:
+        async def waits(module: str) -> tuple[int, list[AwaitedInput]]:
+            told = await bus.ask("mission_control/all", AskModule(module), ModuleWaits, within_s=1.0)
+            return told.runs, told.awaited
+
+        assert await waits("doubler") == (0, [AwaitedInput("number", TESTER, has_come=False, is_late=False)])
+        assert await waits("summing") == (0, [AwaitedInput("twice", "doubler", has_come=False, is_late=False)])
+        bus.publish(TESTER, Conversation.EVENTS, Number(1.0))
+        await VirtualClock().sleep_s(1.0)
+        assert await waits("doubler") == (1, [AwaitedInput("number", TESTER, has_come=True, is_late=False)])
+        assert await waits("follower") == (0, [AwaitedInput("sum", "summing", has_come=False, is_late=False)])
+        with pytest.raises(UnknownModule, match="all has no module 'nobody'"):
+            await waits("nobody")
+
+    play(local_mission, beside, arranged(orders(ARRANGEMENTS[0], own_thread), NUMBERS), scene)
 
 
 def test_misses_are_named_in_status_and_statistics(local_mission: Any, beside: Any) -> None:
