@@ -7,14 +7,16 @@ only the type checker knows are never read.
 
 from __future__ import annotations
 
+import ast
 import inspect
 import itertools
 import typing
 from collections.abc import Iterator
+from pathlib import Path
 
 import msgspec
 
-LEAST_LETTERS = 6  # chosen: shorter words often differ in a letter, as act and fact, see and seek
+LEAST_LETTERS = 6  # chosen: shorter words often differ in a letter, as act and fact, see and seek; see ``_is_slip``
 
 
 def class_faults(kind: type) -> Iterator[str]:
@@ -68,12 +70,13 @@ def _can_be_awaited(function: typing.Any) -> bool:
 
 
 def _of_names(kind: type) -> Iterator[str]:
-    """Yield a fault for each new method whose name looks like that of a method that no derived class overrides."""
+    """Yield a fault for each new method whose name looks like that of a method that its class does not override."""
     methods = [name for name in dir(kind) if name[0] != "_" and inspect.isfunction(getattr(kind, name))]
     makers = {name: [one for one in kind.__mro__ if name in vars(one)] for name in methods}
-    for own, base in itertools.permutations([name for name in methods if len(makers[name]) == 1], 2):
+    for own, base in itertools.permutations(methods, 2):
         maker, meant = makers[own][0], makers[base][0]
-        if maker is not meant and issubclass(maker, meant) and _is_misspelt(own, base):
+        is_new = len(makers[own]) == 1 and maker is not meant and issubclass(maker, meant)
+        if is_new and (_is_misspelt(own, base) or (_is_slip(own, base) and _is_unused(own, maker))):
             yield f"{own} looks like {base} misspelt, which is not overridden; write {base}, or a less similar name"
 
 
@@ -85,6 +88,28 @@ def _is_misspelt(name: str, other: str) -> bool:
     if len(other) < LEAST_LETTERS or name[-1] != other[-1]:
         return False
     return not {name, *_without_a_letter(name)}.isdisjoint({other, *_without_a_letter(other)})
+
+
+def _is_slip(name: str, other: str) -> bool:
+    """Return whether a short name has one letter doubled or missing, or two letters exchanged.
+
+    Example:
+        >>> [name for name in ("actt", "at", "atc", "fact", "ask") if _is_slip(name, "act")]
+        ['actt', 'at', 'atc']
+    """
+    places = range(len(other))
+    doubled = {other[: at + 1] + other[at:] for at in places}
+    exchanged = {other[:at] + other[at + 1 : at + 2] + other[at] + other[at + 2 :] for at in places}
+    return len(other) < LEAST_LETTERS and name in doubled.union(exchanged, _without_a_letter(other))
+
+
+def _is_unused(name: str, kind: type) -> bool:
+    """Return whether the file of the class uses the name nowhere, so that only a base class could call the method."""
+    try:
+        tree = ast.parse(Path(inspect.getfile(kind)).read_text())
+    except (OSError, TypeError, SyntaxError, ValueError):  # a class that was made without a file, or of a broken one
+        return False
+    return not any(name in (getattr(node, "attr", ""), getattr(node, "id", "")) for node in ast.walk(tree))
 
 
 def _without_a_letter(name: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Coroutine, Mapping
+from collections.abc import Coroutine, Mapping, Sequence
 from typing import Any, ClassVar
 
 import pytest
@@ -15,6 +15,7 @@ from backbone.mission.class_facts import shipped_classes
 from backbone.mission.class_probe import facts_of
 from backbone.shipped import is_shipped
 from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.children import Children
 from resource_pool.arc_client import Frame
 from resource_pool.commands import Command
 from resource_pool.holds import Hold
@@ -51,6 +52,36 @@ class Short(Quiet):
 
 class Misspelt(Quiet):
     async def suspendig(self, deadline_s: float) -> None:
+        pass
+
+
+class Doubled(Quiet):
+    async def actt(self) -> None:
+        pass
+
+
+class Swapped(Quiet):
+    async def satrt(self) -> None:
+        pass
+
+
+class Dropped(Quiet):
+    def rles(self, children: Sequence[str]) -> Children:
+        return Children(children)
+
+
+class Helped(Quiet):
+    """Its names are a letter away from hooks, and used."""
+
+    async def start(self) -> None:
+        self.stat()
+        Helped.cat()
+
+    def stat(self) -> None:
+        pass
+
+    @staticmethod
+    def cat() -> None:
         pass
 
 
@@ -141,6 +172,9 @@ class Read(Behavior[Speed]):
         (Unawaited, "act is a 'def'; write it as an 'async def', as the base class does"),
         (Short, "suspended: too many positional arguments; the base class has suspended(self, reason, by)"),
         (Misspelt, "suspendig looks like suspending misspelt, " + RENAME.format("suspending")),
+        (Doubled, "actt looks like act misspelt, " + RENAME.format("act")),
+        (Swapped, "satrt looks like start misspelt, " + RENAME.format("start")),
+        (Dropped, "rles looks like rules misspelt, " + RENAME.format("rules")),
         (Dangerous, "make_save looks like make_safe misspelt, " + RENAME.format("make_safe")),
         (Forgetful, FORGOTTEN),
         (Heir, FORGOTTEN),
@@ -160,7 +194,7 @@ def test_a_command_with_a_field_without_a_type_is_refused_by_check() -> None:
     assert facts_of(f"{__name__}:Blinker").failure == "Blink.times has no type, so it is no field; write times: int = 3"
 
 
-@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful, Spelt, Similar])
+@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful, Spelt, Similar, Helped])
 def test_a_class_that_can_work_has_no_fault(kind: type) -> None:
     assert list(class_faults(kind)) == []
 
