@@ -55,8 +55,9 @@ class Failures:
         if name in self._since_s:
             return
         self._forget_old()
-        since_s, _ = self._ended.pop(name, (self._clock.now_s(), 0.0))
-        if since_s < self._clock.now_s():
+        now_s = self._clock.now_s()
+        since_s, _ = self._ended.pop(name, (now_s, 0.0))
+        if since_s < now_s:
             self._repeated.add(name)
         self._since_s[name] = since_s
 
