@@ -15,6 +15,7 @@ from backbone.errors import Refusal
 
 MAX_NAME_LENGTH = 63  # chosen: the longest label of a host name (RFC 1035), names may become host labels
 MAX_PID_DIGITS = 7  # Linux: PID_MAX_LIMIT is 4194304
+_COUNTED = re.compile(r"(\D*)(\d{0,18})")  # chosen: a longer number is several
 _LEGAL = re.compile(rf"[a-z][a-z0-9_-]{{0,{MAX_NAME_LENGTH - 1}}}")
 
 
@@ -53,6 +54,16 @@ def legal(name: str) -> str:
     if not is_legal(name):
         raise IllegalName(f"{name!r} is not a legal name")
     return name
+
+
+def reading_order(name: str) -> list[tuple[str, int]]:
+    """Return the key that sorts names or addresses as people count.
+
+    Example:
+        >>> sorted(["scout10", "scout2", "scout"], key=reading_order)
+        ['scout', 'scout2', 'scout10']
+    """
+    return [(text, int(digits or 0)) for text, digits in _COUNTED.findall(name)]
 
 
 def address(subsystem: Subsystem, component: str) -> str:

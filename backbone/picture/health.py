@@ -16,6 +16,7 @@ from enum import StrEnum
 from typing import Annotated
 
 from backbone.component.messages import Absence, ComponentState
+from backbone.naming import reading_order
 from backbone.picture.words import absence_lines
 from backbone.ranges import MANY
 from backbone.wire import Message, plain
@@ -67,7 +68,7 @@ def health(
         known = absent.get(absence.name)
         if known is None or absence.since_s < known.since_s:
             absent[absence.name] = absence
-    found = sorted(absent.values(), key=lambda each: (not each.vital, each.name))
+    found = sorted(absent.values(), key=lambda each: (not each.vital, reading_order(each.name)))
     return MissionHealth(_word(found, now_s, rate), found)
 
 

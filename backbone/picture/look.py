@@ -144,11 +144,11 @@ def _lacks(listing: Components, processes: Iterable[ProcessState]) -> list[str]:
     starting = {process.spawn.name for process in kept if not process.pid and not process.last_end} - listed - unknown
     lines = []
     if unknown:
-        lines.append(f"the list is incomplete: no word yet from {counted_names(sorted(unknown))}")
+        lines.append(f"the list is incomplete: no word yet from {counted_names(unknown)}")
     if starting:
-        lines.append(f"the list is incomplete: still being started: {counted_names(sorted(starting))}")
+        lines.append(f"the list is incomplete: still being started: {counted_names(starting)}")
     if running:
-        lines.append(f"the list is incomplete: running and not registered yet: {counted_names(sorted(running))}")
+        lines.append(f"the list is incomplete: running and not registered yet: {counted_names(running)}")
     elif not listing.complete and not lines:
         lines.append("the list may be incomplete: the nameserver has just started, and components still register again")
     return lines

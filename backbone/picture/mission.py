@@ -16,9 +16,9 @@ from backbone.mission_log.log import Log, MissionLog, PeopleKnown
 from backbone.mission_log.operators import OperatorActed
 from backbone.mission_log.people import People
 from backbone.nameserver.messages import Components, Disappeared
-from backbone.naming import Subsystem, component_of
+from backbone.naming import Subsystem, component_of, reading_order
 from backbone.picture.health import MissionHealth, health
-from backbone.picture.words import stop_line
+from backbone.picture.words import stop_lines
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 from backbone.wire import plain
@@ -119,7 +119,8 @@ class MissionPicture:
     @property
     def stops(self) -> dict[str, StandingStop]:
         """The emergency stops in force, by the name of the stopped component."""
-        return {component_of(at): c.stop for at, c in sorted(self.components.items()) if c.stop is not None}
+        stopped = {component_of(at): c.stop for at, c in self.components.items() if c.stop is not None}
+        return {name: stopped[name] for name in sorted(stopped, key=reading_order)}
 
     @property
     def people(self) -> People:
@@ -127,8 +128,8 @@ class MissionPicture:
         return self.log.people
 
     def stop_lines(self) -> list[str]:
-        """Return one line for each emergency stop in force, for people."""
-        return [self.people.named(stop_line(name, stop, self.at_s)) for name, stop in self.stops.items()]
+        """Return the lines about the emergency stops in force, for people; one for all that are alike, if many."""
+        return [self.people.named(line) for line in stop_lines(self.stops, self.at_s)]
 
     def remarks(self) -> list[str]:
         """Return the problems that are no absence, one line each."""
@@ -137,7 +138,8 @@ class MissionPicture:
 
     def of_subsystem(self, subsystem: Subsystem) -> list[ComponentState]:
         """Return the components of one of the four subsystems, sorted by name."""
-        return [c for at, c in sorted(self.components.items()) if at.startswith(f"{subsystem}/")]
+        there = (at for at in self.components if at.startswith(f"{subsystem}/"))
+        return [self.components[at] for at in sorted(there, key=reading_order)]
 
     def restarts(self, component: ComponentState) -> int:
         """Return how often the component was restarted."""

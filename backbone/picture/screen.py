@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
-from backbone.naming import Subsystem, component_of
+from backbone.naming import Subsystem, component_of, reading_order
 from backbone.picture.fitted_table import FittedTable
 from backbone.picture.health import HealthWord
 from backbone.picture.mission import MissionPicture
@@ -137,7 +137,7 @@ def _component_line(picture: MissionPicture, component: ComponentState, doing: s
 
 def _holder_lines(schedule: Schedule) -> list[Text]:
     lines = []
-    for rc in schedule.rcs:
+    for rc in _in_order(schedule):
         line = Text(f"{rc.rc:10.10s} ")
         if rc.holders:
             holders = ", ".join(f"{holder.arc} #{holder.epoch}" for holder in rc.holders)
@@ -221,7 +221,11 @@ def _rcs_table(schedule: Schedule) -> FittedTable:
         )
 
     columns = ("RC", "kind", "state", "holder", "epoch", "since", "until", "next")
-    return table("resources", columns, map(row, schedule.rcs))
+    return table("resources", columns, map(row, _in_order(schedule)))
+
+
+def _in_order(schedule: Schedule) -> list[RcView]:
+    return sorted(schedule.rcs, key=lambda rc: reading_order(rc.rc))
 
 
 def _coming(rc: RcView) -> list[str]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from backbone.component.messages import Absence, StandingStop
 from backbone.mission_log.people import People
+from backbone.naming import reading_order
 from backbone.scheduling.views import RequestView
 from backbone.spoken import counted
 
@@ -81,22 +82,32 @@ def absence_line(absence: Absence, now_s: float) -> str:
 
 def absence_lines(absences: Iterable[Absence], now_s: float) -> list[str]:
     """Return a line for each absence, or one for all that differ only in own names and times, if these are many."""
-    alike: dict[str, list[Absence]] = {}
-    for absence in absences:
-        alike.setdefault(_SECONDS.sub("", _nameless(absence, now_s)), []).append(absence)
+    return _joined((absence.name, _trouble(absence, now_s)) for absence in absences)
+
+
+def stop_lines(stops: Mapping[str, StandingStop], now_s: float) -> list[str]:
+    """Return a line for each emergency stop in force, or one for all that differ only in times, if these are many."""
+    return _joined((name, _stop(stop, now_s)) for name, stop in stops.items())
+
+
+def _joined(facts: Iterable[tuple[str, str]]) -> list[str]:
+    """Return a line for each name and its fact, or one for all whose facts are alike, if these are many."""
+    alike: dict[str, list[tuple[str, str]]] = {}
+    for name, fact in facts:
+        alike.setdefault(_SECONDS.sub("", _nameless(name, fact)), []).append((name, fact))
     lines = []
     for same in alike.values():
         if len(same) <= NAMES_SHOWN:
-            lines += [absence_line(absence, now_s) for absence in same]
+            lines += [f"{name} {fact}" for name, fact in same]
         else:
-            names = counted_names([absence.name for absence in same])
-            lines.append(f"each of {names} {_with_ranges([_nameless(absence, now_s) for absence in same])}")
+            names = counted_names([name for name, _ in same])
+            lines.append(f"each of {names} {_with_ranges([_nameless(name, fact) for name, fact in same])}")
     return lines
 
 
-def _nameless(absence: Absence, now_s: float) -> str:
-    """Return the trouble with ``NAME`` in place of the component's own name."""
-    return re.sub(rf"(?<![\w.-]){re.escape(absence.name)}(?![\w.-])", "NAME", _trouble(absence, now_s))
+def _nameless(name: str, fact: str) -> str:
+    """Return the fact with ``NAME`` in place of the component's own name."""
+    return re.sub(rf"(?<![\w.-]){re.escape(name)}(?![\w.-])", "NAME", fact)
 
 
 def _with_ranges(texts: Sequence[str]) -> str:
@@ -120,13 +131,14 @@ def _trouble(absence: Absence, now_s: float) -> str:
     return "; ".join([f"{trouble}: {absence.cause}", *filter(None, (absence.doing, absence.remedy))])
 
 
-def counted_names(names: Sequence[str]) -> str:
+def counted_names(names: Collection[str]) -> str:
     """Return the number of these components and the first names.
 
     Example:
-        >>> counted_names(["radio", "scout1"])
-        '2 components (radio, scout1)'
+        >>> counted_names({"scout10", "scout9"})
+        '2 components (scout9, scout10)'
     """
+    names = sorted(names, key=reading_order)
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     return f"{counted(len(names), 'component')} ({', '.join(names[:NAMES_SHOWN])}{more})"
 
@@ -138,9 +150,11 @@ def stop_line(name: str, stop: StandingStop, now_s: float) -> str:
         >>> stop_line("scout1", StandingStop(1, "anna", "child in the room", 2.0), 5.0)
         'scout1 is STOPPED by anna for 3.0 s: child in the room; lift the stop at a console when it may move'
     """
+    return f"{name} {_stop(stop, now_s)}"
+
+
+def _stop(stop: StandingStop, now_s: float) -> str:
     why = f": {stop.reason}" if stop.reason else ""
     unsure = "" if stop.is_confirmed else "; its radio did not confirm the stop"
     lasts_s = max(0.0, now_s - stop.since_s)
-    return (
-        f"{name} is STOPPED by {stop.by} for {lasts_s:.1f} s{why}{unsure}; lift the stop at a console when it may move"
-    )
+    return f"is STOPPED by {stop.by} for {lasts_s:.1f} s{why}{unsure}; lift the stop at a console when it may move"

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from backbone.component.abilities import FieldForm
 from backbone.component_database.messages import Types
 from backbone.mission_log.people import is_console, screens_of
-from backbone.naming import Subsystem, component_of
+from backbone.naming import Subsystem, component_of, reading_order
 from backbone.picture.mission import MissionPicture
 from backbone.picture.words import because
 from backbone.rc_manager.messages import Leases
@@ -96,14 +96,14 @@ class RobotBoard:
         if self._picture.schedule is None:
             return []
         requests = {request.arc: request for request in self._picture.schedule.requests}
-        rcs = sorted((rc for rc in self._picture.schedule.rcs if rc.is_robot), key=lambda rc: rc.rc)
+        rcs = sorted((rc for rc in self._picture.schedule.rcs if rc.is_robot), key=lambda rc: reading_order(rc.rc))
         return [self._robot(rc, number, requests, now_s) for number, rc in enumerate(rcs, 1)]
 
     def names(self) -> list[str]:
         """Return every known robot, from the schedule or from components."""
         schedule, there = self._picture.schedule, self._picture.components.values()
         in_schedule = {rc.rc for rc in (schedule.rcs if schedule else []) if rc.is_robot}
-        return sorted(in_schedule | {component_of(one.address) for one in there if one.is_robot})
+        return sorted(in_schedule | {component_of(one.address) for one in there if one.is_robot}, key=reading_order)
 
     def stop_of(self, robot: str) -> StopState | None:
         """Return the stop in force on the robot."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -21,7 +22,7 @@ from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture, misses
 from backbone.picture.screen import live_screen, screen
 from backbone.rc_manager.messages import AskSchedule
-from backbone.scheduling.views import Schedule
+from backbone.scheduling.views import RcView, Schedule
 from backbone.wire import Message
 
 CREATOR = "backbone/creator-base"
@@ -216,7 +217,7 @@ def test_without_a_nameserver_there_is_no_first_picture() -> None:
         (
             Components(LISTED, True, 9.5),
             tuple(process(f"scout{number}") for number in range(2, 309)),
-            "the list is incomplete: running and not registered yet: 307 components (scout10, scout100",
+            "the list is incomplete: running and not registered yet: 307 components (scout2, scout3",
         ),
         (
             Components(LISTED, True, 9.5),
@@ -243,6 +244,28 @@ def test_a_standing_emergency_stop_is_shown_with_who_set_it_when_and_why(draw: C
     (stop,) = picture.to_json()["stops"]
     assert (stop["name"], stop["by"], stop["reason"], stop["since_s"]) == ("scout1", "anna", "child in the room", 4.0)
     assert looked().to_json()["stops"] == []
+
+
+def test_many_stops_are_one_line_in_the_order_of_counting() -> None:
+    """After a stop of all sixty robots, status began with sixty lines, of scout1, scout10, scout11 …"""
+    robots = [
+        component(f"resource_pool/scout{n}", "scout", stop=StandingStop(3, "anna", "", 4.0 + n / 10))
+        for n in (10, 2, 1, *range(11, 21))
+    ]
+    picture = looked(Components(robots, True, 0.0))
+    assert picture.stop_lines() == [
+        "each of 13 components (scout1, scout2, scout10, scout11, scout12, scout13, scout14, scout15 and 5 more) "
+        "is STOPPED by anna for 4.0 to 5.9 s; lift the stop at a console when it may move"
+    ]
+    assert len(looked(Components(robots[:8], True, 0.0)).stop_lines()) == 8
+
+
+def test_components_and_resources_are_in_the_order_of_counting() -> None:
+    names = ["scout1", "scout10", "scout2"]
+    picture = looked(Components([component(f"resource_pool/{name}", "scout") for name in names], True, 0.0))
+    picture.schedule = Schedule(1.0, [RcView(name, "scout", "up", False, 1.0, [], 0, []) for name in names], [], [])
+    for part in (*drawn(screen(picture)).split("resources"), drawn(live_screen(picture, [], 40))):
+        assert [*dict.fromkeys(re.findall(r"\bscout\d+\b", part))] == ["scout1", "scout2", "scout10"]
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from console_scenes import (
     component,
     held_model,
     model,
+    rc,
     request,
 )
 from hypothesis import given
@@ -55,6 +56,13 @@ def test_the_robot_table_says_who_holds_what_since_when_until_when_and_who_waits
     assert (held.priority, held.since_s, held.until_s) == ("iros2001:10/surveillance:5/watch1:3", 5.0, 10.0)
     assert held.waiting == ["console-1"]
     assert (free.holder, free.is_up) == ("", True)
+
+
+def test_robots_have_their_numbers_in_the_order_of_counting() -> None:
+    """The key 2 took scout10, and the next robot after scout1 was scout10."""
+    shown = model(Heard(8.0, Schedule(8.0, [rc(f"scout{n}", "scout", []) for n in (10, 1, 2)], [], [])))
+    assert [(row.number, row.robot) for row in shown.robots(8.0)] == [(1, "scout1"), (2, "scout2"), (3, "scout10")]
+    assert shown.team.robots.names() == ["scout1", "scout2", "scout10"]
 
 
 def test_a_lease_grows_old_until_it_is_renewed() -> None:

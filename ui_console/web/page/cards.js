@@ -6,7 +6,7 @@ import { actWhenHeld } from "./holding.js";
 import { ofMission } from "./missions.js";
 import { notice } from "./notices.js";
 import { Screen } from "./pictures.js";
-import { lasting, set } from "./text.js";
+import { lasting, readingOrder, set } from "./text.js";
 
 /** @import { OwnView, RobotView, StopView } from "./messages.d.ts" */
 /** @import { Act, Picture, Say, Tap } from "./types.d.ts" */
@@ -80,7 +80,7 @@ export class Cards {
     if (name === this.large && this.stage.firstElementChild?.getAttribute("data-robot") === name) return;
     this.large = name;
     const focus = document.activeElement;
-    for (const [one, { root }] of [...this.cards].sort(([one], [other]) => (one < other ? -1 : 1))) {
+    for (const [one, { root }] of [...this.cards].sort(([one], [other]) => readingOrder(one, other))) {
       root.classList.toggle("is-large", one === name);
       (one === name ? this.stage : this.thumbs).append(root);
     }

@@ -5,7 +5,7 @@ import { age, drawBody, drawCross, drawFloor, drawGoal } from "./map_draw.js";
 import { listed, meantBy, Plan, stepped } from "./map_plan.js";
 import { isOver } from "./orders.js";
 import { drawn } from "./svg.js";
-import { set } from "./text.js";
+import { readingOrder, set } from "./text.js";
 
 /** @import { BodyView, FloorView, OrderView, View } from "./messages.d.ts" */
 /** @import { Act, Point } from "./types.d.ts" */
@@ -190,7 +190,8 @@ export class RobotMap {
   /** @param {string} robot */
   toggle(robot) {
     if (!this.selected.delete(robot)) this.selected.add(robot);
-    set(this.told, this.selected.size ? `selected: ${listed([...this.selected].sort())}` : "no robot is selected");
+    const names = [...this.selected].sort(readingOrder);
+    set(this.told, names.length ? `selected: ${listed(names)}` : "no robot is selected");
     this.draw();
   }
 

@@ -1,5 +1,7 @@
 // Conversion between places on the floor and points of the screen. Pure.
 
+import { readingOrder } from "./text.js";
+
 /** @import { BodyView, FloorView } from "./messages.d.ts" */
 /** @import { Point } from "./types.d.ts" */
 
@@ -124,7 +126,7 @@ export function pixelAt([left, top], [boxWidth, boxHeight], [width, height]) {
  * @param {string} inHand Empty: none.
  */
 export function meantBy(selected, inHand) {
-  const all = [...selected].sort();
+  const all = [...selected].sort(readingOrder);
   return all.length || !inHand ? all : [inHand];
 }
 

@@ -11,6 +11,16 @@ export function set(element, text) {
 }
 
 /**
+ * Compare names as people count, for a sort: scout2 is before scout10.
+ *
+ * @param {string} one
+ * @param {string} other
+ */
+export function readingOrder(one, other) {
+  return one.localeCompare(other, "en", { numeric: true });
+}
+
+/**
  * A time or a remaining time; empty if there is none.
  *
  * @param {number} [time_s]

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { isOther } from "../../../../ui_console/web/page/hand.js";
-import { lasting, seconds, shortened } from "../../../../ui_console/web/page/text.js";
+import { lasting, readingOrder, seconds, shortened } from "../../../../ui_console/web/page/text.js";
 
 test("times have one digit, and none where there is none", () => {
   assert.equal(seconds(12.34), "12.3 s");
@@ -13,6 +13,10 @@ test("times have one digit, and none where there is none", () => {
   assert.equal(lasting(7.4), " 7 s ago");
   assert.equal(lasting(200), " 3 min ago");
   assert.equal(lasting(-1), "");
+});
+
+test("names are in the order of counting", () => {
+  assert.deepEqual(["scout10", "scout2", "rover1"].sort(readingOrder), ["rover1", "scout2", "scout10"]);
 });
 
 test("of a long name the end is kept, because names differ there", () => {
