@@ -117,8 +117,14 @@ def _without_a_letter(name: str) -> list[str]:
 
 
 def _of_constructors(kind: type) -> Iterator[str]:
-    """Yield a fault for each constructor that cannot call that of its base class."""
+    """Yield a fault for each constructor that cannot call that of its base class, or cannot be called like it.
+
+    A base class that can be made without arguments, as modules are, leaves them to the derived class.
+    """
     made = [one for one in kind.__mro__ if inspect.isfunction(vars(one).get("__init__")) and not _is_protocol(one)]
+    own, base = (vars(one)["__init__"] for one in (made[0], made[-1])) if made else (None, None)
+    if base is not None and any(one.default is one.empty for one in [*inspect.signature(base).parameters.values()][1:]):
+        yield from fault_of_method("__init__", own, base, "the base class")
     for one in made[:-1]:
         constructor = inspect.unwrap(vars(one)["__init__"])
         if not {"super", "__init__"} & set(constructor.__code__.co_names):

@@ -116,6 +116,11 @@ class Forgetful(Quiet):
         self.count = 0
 
 
+class Simple(Quiet):
+    def __init__(self) -> None:
+        super().__init__()  # type: ignore[call-arg]
+
+
 class Careful(Quiet):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         Quiet.__init__(self, launch, bus, clock)
@@ -168,6 +173,10 @@ class Read(Behavior[Speed]):
 @pytest.mark.parametrize(
     ("kind", "fault"),
     [
+        (
+            Simple,
+            "__init__: too many positional arguments; the base class has __init__(self, launch, bus, clock)",
+        ),
         (Unseeing, "see is an 'async def'; write it as a 'def', as the base class does"),
         (Unawaited, "act is a 'def'; write it as an 'async def', as the base class does"),
         (Short, "suspended: too many positional arguments; the base class has suspended(self, reason, by)"),
