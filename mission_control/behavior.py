@@ -196,6 +196,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if failed and not self.own_reports.has_reader and not self._children.absences(has_finished=True):
             self._children.give_up(self.name, self.payload)
         self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
+        self.report(f"finished: {status}" + (f"; last: {self.feedback}" if self.feedback else ""))
         self.begin_task(self._wind_up(), "wind-up")
 
     def tell_parent(self, payload: Mapping[str, object]) -> None:

@@ -9,6 +9,7 @@ import pytest
 from behaviors_of_a_placer import ARC, node, root
 from fake_resource_pool import FakePlacer, Run
 
+from backbone.component.messages import AskState, ComponentState
 from backbone.errors import Refusal
 from backbone.placer.messages import NoHost
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus
@@ -178,6 +179,19 @@ def test_it_tells_how_far_it_is_and_draws_its_branch(placer_world: Run) -> None:
         state = await placer.bus.ask("mission_control/top", AskBehavior(), BehaviorState, within_s=1.0)
         assert state.status is BehaviorStatus.RUNNING
         assert state.tree.splitlines()[1] == "└─ leaf (watcher, priority 3): running"
+
+    placer_world(scene)
+
+
+def test_it_is_shown_as_finished_with_the_last_line_of_its_work(placer_world: Run) -> None:
+    """``status`` showed the last turn of a behavior for ever, as if it still worked."""
+
+    async def scene(placer: FakePlacer) -> None:
+        watcher = await root(placer, node("watch1"))
+        watcher.report("turn 2 of 2")
+        watcher.finish(BehaviorStatus.SUCCESS)
+        state = await placer.bus.ask("mission_control/watch1", AskState(), ComponentState, within_s=1.0)
+        assert state.feedback == "finished: success; last: turn 2 of 2"
 
     placer_world(scene)
 
