@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
+LARGE = 999.5  # from here on, three significant digits are written with an exponent
+HUGE = 1e9  # chosen: a longer number is not read at a glance
+
 
 def counted(number: int, noun: str) -> str:
     """Return number and noun, in the singular for 1.
@@ -14,6 +17,16 @@ def counted(number: int, noun: str) -> str:
         ('1 component', '2 components', '0 alarms')
     """
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def three_digits(number: float) -> str:
+    """Return a number with three significant digits, and a larger one in full.
+
+    Example:
+        >>> three_digits(7.1428), three_digits(4000.0), three_digits(12345.6), three_digits(999.7), three_digits(1e20)
+        ('7.14', '4000', '12346', '1000', '1e+20')
+    """
+    return f"{number:.0f}" if LARGE <= abs(number) < HUGE else f"{number:.3g}"
 
 
 def value_text(value: object) -> str:

@@ -6,6 +6,7 @@ import math
 
 from backbone.component.abilities import UNLIMITED, FieldForm, ValueKind
 from backbone.errors import Refusal
+from backbone.spoken import three_digits
 from ui_console.model.applied import words_of
 
 FLAGS = {"yes": True, "on": True, "true": True, "1": True, "no": False, "off": False, "false": False, "0": False}
@@ -26,6 +27,8 @@ def label_of(field: FieldForm) -> str:
         'turn, -7.14 to 7.14 rad/s'
         >>> label_of(FieldForm("for_s", ValueKind.NUMBER, "s", least=0.0))
         'for, at least 0 s'
+        >>> label_of(FieldForm("pitch_hz", ValueKind.NUMBER, "Hz", 100.0, 4000.0))
+        'pitch, 100 to 4000 Hz'
         >>> label_of(FieldForm("on", ValueKind.FLAG)), label_of(FieldForm("gait", ValueKind.TEXT, choices=["trot"]))
         ('on, yes or no', 'gait: trot')
     """
@@ -35,9 +38,10 @@ def label_of(field: FieldForm) -> str:
     if field.choices:
         return f"{words}: {', '.join(field.choices)}"
     if has_range(field):
-        return f"{words}, {field.least:.3g} to {field.most:.3g}{unit}"
+        return f"{words}, {three_digits(field.least)} to {three_digits(field.most)}{unit}"
     if field.least > -UNLIMITED or field.most < UNLIMITED:
-        limit = f"at least {field.least:.3g}" if field.least > -UNLIMITED else f"at most {field.most:.3g}"
+        has_least = field.least > -UNLIMITED
+        limit = f"at least {three_digits(field.least)}" if has_least else f"at most {three_digits(field.most)}"
         return f"{words}, {limit}{unit}"
     return f"{words},{unit}" if unit else words
 

@@ -13,6 +13,7 @@ import msgspec
 
 from backbone import ranges
 from backbone.component.abilities import FieldForm, unit_of
+from backbone.spoken import three_digits
 from resource_pool.arc_client import Readings
 from ui_console.model.applied import words_of
 from ui_console.model.fields import has_range
@@ -82,8 +83,9 @@ def _gauge(name: str, value: float | bool, form: FieldForm | None) -> GaugeView:
         return GaugeView(words_of(name.removesuffix(SHARE)), f"{100 * value:.0f} %", share, is_share=True, doc=doc)
     unit = unit_of(name)
     unit = f" {unit}" if unit else ""
-    text = f"{value:.3g}{unit}"
+    text = f"{three_digits(value)}{unit}"
     if form is None or not has_range(form) or form.most <= form.least or (form.least, form.most) in OF_THE_BUS:
         return GaugeView(words_of(name), text, doc=doc)
     place = min(1.0, max(0.0, (value - form.least) / (form.most - form.least)))
-    return GaugeView(words_of(name), text, place, span=f"{form.least:.3g} to {form.most:.3g}{unit}", doc=doc)
+    span = f"{three_digits(form.least)} to {three_digits(form.most)}{unit}"
+    return GaugeView(words_of(name), text, place, span=span, doc=doc)
