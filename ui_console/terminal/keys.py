@@ -191,9 +191,11 @@ def hints(view: ConsoleView, profile: Profile, meant: str) -> list[Hint]:
 
 
 def _hands(view: ConsoleView, profile: Profile) -> Iterator[Hint]:
-    own, is_pendant = view.own, profile is Profile.PENDANT
-    if own.is_held:
+    own, can, is_pendant = view.own, view.abilities, profile is Profile.PENDANT
+    drives = own.is_held and (can is None or can.reach is not None)
+    if drives:
         yield Hint("←↑↓→", "drive", "", 5)
+    if own.is_held and (can is None or can.can_halt):
         yield Hint("space", "halt", "stop", 6)
     if is_pendant:
         yield Hint("enter", "give back" if own.is_asked else "take", "take_or_release", 6)
@@ -212,13 +214,13 @@ def _hands(view: ConsoleView, profile: Profile) -> Iterator[Hint]:
     if own.orders:
         yield Hint("N", "next robot", "next_robot", 3)
     yield Hint("p", "pick robot", "pick", 3)
-    if own.is_held:
+    if drives:
         yield Hint("+ -", "speed", "", 2)
-        can = view.abilities
+    if own.is_held:
         if can is None or can.takes("jump"):
             yield Hint("j", "jump", "jump", 1)
         if can is not None and can.commands:
-            yield Hint("o", "command", "command", 1)
+            yield Hint("o", "command", "command", 1 if drives else 5)
 
 
 def key_lines(found: Sequence[Hint], columns: int, rows: int) -> Text:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import textwrap
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -70,8 +71,10 @@ class Video(Widget):
     def render_line(self, y: int) -> Strip:
         """Return one row of cells."""
         width, blank = self.size.width, self.rich_style  # Textual's filter for NO_COLOR needs a style everywhere
-        if self._remark and y == self.size.height // 2:
-            return Strip([Segment(self._remark.center(width), blank + OLD)]).crop(0, width)
+        remark = textwrap.wrap(self._remark, max(1, width))
+        row = y - self.size.height // 2 + len(remark) // 2
+        if 0 <= row < len(remark):
+            return Strip([Segment(remark[row].center(width), blank + OLD)]).crop(0, width)
         if self._steps is None or self._shown is None or 2 * y >= len(self._steps):
             return Strip.blank(width, blank)
         if not self._has_pixels or self._remark:

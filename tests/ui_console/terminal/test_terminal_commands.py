@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
 import pytest
 from console_scenes import ASK, GRANT, model
 from fake_resource_pool import FakePlacer
@@ -61,6 +62,19 @@ async def test_a_command_with_fields_asks_for_each_with_its_range_and_refuses_a_
         assert session.wanted == []
         await shown_after(pilot, "backspace", *"0.3", "enter")
         assert session.wanted == [DIMMED]
+
+
+async def test_a_device_that_cannot_drive_offers_its_commands_and_no_key_to_drive() -> None:
+    """At 80 columns a siren offered the arrows, hid the key of its commands, and cut why it has no pictures."""
+    assert LIT is not None
+    device = msgspec.structs.replace(LIT, reach=None, can_halt=False)
+    async with ConsoleApp(lit_session(device)).run_test(size=(80, 24)) as pilot:
+        shown = await shown_after(pilot)
+        assert "o command" in shown
+        assert "drive  " not in shown
+        assert "space halt" not in shown
+        assert "no pictures: this kind of ARC has no camera" in shown
+        assert "framegrabber" in shown
 
 
 @pytest.mark.parametrize("keys", [["o"], ["o", "down", "enter"]], ids=["list", "fields"])
