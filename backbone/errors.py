@@ -12,8 +12,9 @@ A code is for machines, the detail carries the numbers for people, the remedy is
 
 from __future__ import annotations
 
+import inspect
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from traceback import walk_tb
 from types import FrameType
 from typing import ClassVar
@@ -121,6 +122,12 @@ def own_place(error: BaseException) -> str:
     ]
     own = next((package for package, _ in places if package not in _NOT_A_DEVELOPERS), "")
     return printable(next((place for package, place in reversed(places) if package == own), ""))
+
+
+def defined_at(function: Callable[..., object]) -> str:
+    """Return the file and line at which a function of Python begins; empty: it is no such function."""
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    return "" if code is None else printable(f"{code.co_filename}, line {code.co_firstlineno}")
 
 
 def _package(frame: FrameType) -> str:

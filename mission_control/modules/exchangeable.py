@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import get_origin
 
-from backbone.errors import Refusal
+from backbone.errors import Refusal, defined_at
 from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, write
 from mission_control.modules.graph import Graph, GraphRefused, Member, WiringFault
 from mission_control.modules.module import Module
@@ -102,22 +102,21 @@ def judge_of(kinds: Mapping[str, object], kind: type[Module], member: Member) ->
     """
     wanted = [(port, key, kinds[key]) for key, port in member.keyed_outputs]
 
+    def wrong(returned: str, remedy: str) -> WrongModule:
+        return WrongModule(f"update of {member.name} returned {returned} ({defined_at(kind.update)})", remedy=remedy)
+
     def judge(outputs: object) -> None:
         if not isinstance(outputs, kind.Outputs):
-            told = f"update of {member.name} returned {type_name(type(outputs))}, not its Outputs"
-            raise WrongModule(told, remedy="Return them.")
+            names = ", ".join(f"{port.name}=…" for port, _, _ in wanted)
+            raise wrong(f"{type_name(type(outputs))}, not its Outputs", f"Write 'return self.Outputs({names})'.")
         for port, key, of in wanted:
             value = getattr(outputs, port.name)
             if value is None and port.is_required:
-                raise WrongModule(
-                    f"update of {member.name} returned None as {key}, which each round must have",
-                    remedy="Give an output that may be left out the default None: 'name: Class | None = None'.",
-                )
+                remedy = "Give an output that may be left out the default None: 'name: Class | None = None'."
+                raise wrong(f"None as {key}, which each round must have", remedy)
             if value is not None and not is_of(value, of):
-                raise WrongModule(
-                    f"update of {member.name} returned {type_name(type(value))} as {key}, not {type_name(of)}",
-                    remedy="Return the declared class, made in update; classes of values stay those that run.",
-                )
+                remedy = "Return the declared class, made in update; classes of values stay those that run."
+                raise wrong(f"{type_name(type(value))} as {key}, not {type_name(of)}", remedy)
 
     return judge
 

@@ -10,6 +10,7 @@ import msgspec
 
 from backbone.import_faults import import_fault
 from backbone.keys import Conversation
+from backbone.naming import did_you_mean
 from backbone.quality import Quality
 from backbone.ranges import Values
 from backbone.reading_anew import WrongClass
@@ -53,9 +54,11 @@ class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         try:
             return kind(msgspec.convert(self.parameters, kind.Parameters))
         except msgspec.ValidationError as error:
+            known = [field.name for field in msgspec.structs.fields(kind.Parameters)]
+            unknown = next((name for name in self.parameters if name not in known), "")
             raise WrongModule(
-                f"{self.name} ({self.class_path}) refuses its parameters: {error}",
-                remedy="Write parameters of these names and types.",
+                f"{self.name} ({self.class_path}) refuses its parameters: {error}{did_you_mean(unknown, known)}",
+                remedy=f"There is: {', '.join(known) or 'none'}; give each a value of its type.",
             ) from None
 
     def member(self, module: Module | type[Module]) -> Member:

@@ -249,7 +249,7 @@ class Faulty(Module):
 @pytest.mark.parametrize(
     ("returned", "told"),
     [
-        (None, "update of faulty returned builtins:NoneType, not its Outputs"),
+        (None, r"returned builtins:NoneType, not its Outputs \(.*test_execution_unit.py, line \d+\)"),
         ({"number": Number(1.0)}, "not its Outputs"),
         (Faulty.Outputs("text"), "update of faulty returned builtins:str as number, not"),  # type: ignore[arg-type]
         (Faulty.Outputs(Trigger(1.0)), "Trigger as number, not"),  # type: ignore[arg-type]

@@ -160,6 +160,10 @@ HOST = '<hosts><host name="base" address="127.0.0.1"/></hosts>'
             mission(unit("one", DOUBLER, module("counter", "sample_modules:Counter", STEP)), unit("empty")),
             ["6:78 counter (sample_modules:Counter) refuses its parameters: Expected `float`, got `str` - at `$.step`"],
         ),
+        (
+            mission(unit("one", DOUBLER, module("counter", "sample_modules:Counter", STEP.replace("step", "stop")))),
+            ["6:78 counter (sample_modules:Counter) refuses its parameters: Object contains unknown field `stop` (did"],
+        ),
         (mission(unit("one", module("gone", "sample_modules:Gone"))), ["5:21 sample_modules:Gone: no class Gone"]),
         (mission(unit("one", module("no", "sample_modules:Number"))), ["5:19 sample_modules:Number is no module"]),
         (mission(unit("one", module("plain", "test_unit_component:Plain"))), ["4:7 unit one never runs"]),
