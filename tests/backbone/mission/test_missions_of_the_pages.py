@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from mission_files import MISSION_XML, faults_in, read_text
 
+from backbone.mission.reader import read_mission
+
 DOCS = MISSION_XML.parent / "docs"
 MISSION = MISSION_XML.read_text()
 HOSTS = re.compile(r"<hosts>.*?</hosts>", re.DOTALL)
@@ -98,3 +100,18 @@ def test_the_lamp_of_the_page_and_its_arc_are_types_and_a_resource(tmp_path: Pat
     _radio, lamp, arc = parts_of("write-a-driver.md")
     kind, resource = lamp.split("…\n")
     read_text(tmp_path, put(re.compile("<resources>"), f"<types>{kind}{arc}</types><resources>{resource}"))
+
+
+@pytest.mark.parametrize(
+    ("page", "mission"),
+    [
+        ("first-mission", "mission.xml"),
+        ("the-intruder-nobody-saw", "docs/examples/intruder.xml"),
+        ("compose-a-tree", "docs/examples/night.xml"),
+    ],
+)
+def test_a_tutorial_counts_the_resources_of_its_mission(page: str, mission: str) -> None:
+    """The run of a tutorial lets numbers differ; this one cannot."""
+    told = re.search(r"is fine: (\d+) resources", (DOCS / "tutorial" / f"{page}.md").read_text())
+    assert told is not None
+    assert len(read_mission(DOCS.parent / mission).resources) == int(told[1])
