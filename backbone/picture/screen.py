@@ -154,12 +154,11 @@ def _request_lines(schedule: Schedule, now_s: float) -> list[Text]:
     lines = []
     for request in schedule.requests:
         line = Text(f"{request.arc:22.22s} ")
-        line.append(f"{request.state:10s} ", style=_STATE_STYLE[request.state])
-        line.append(_when(request, now_s))
-        reason = Text("  ", style="dim")
-        reason.append(f"for {', '.join(request.blockers)}, " if request.blockers else "")
-        reason.append(f"{counted(request.turns, 'turn')} so far, {request.priority}{_risen(request)}")
-        lines += [line, reason]
+        line.append(str(request.state), style=_STATE_STYLE[request.state])
+        when = _when(request, now_s)
+        why = f"for {', '.join(request.blockers)}, " if request.blockers else ""
+        why += f"{counted(request.turns, 'turn')} so far, {request.priority}{_risen(request)}"
+        lines += [line, Text.assemble("  ", f"{when}, " if when else "", (why, "dim"))]
     return lines or [Text("no ARC has a request", style="dim")]
 
 

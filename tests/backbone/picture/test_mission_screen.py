@@ -86,6 +86,13 @@ def test_it_shows_components_holders_turns_and_events() -> None:
         assert text in shown
 
 
+def test_a_terminal_of_80_columns_shows_when_each_arc_runs() -> None:
+    """The time stood at the end of a line of padded columns, of which 'i…' was left."""
+    shown = drawn(live_screen(picture(*FEW), EVENTS, 24), 80)
+    assert "at least 2.0 s more" in shown
+    assert "in 2.5 s, for watch1-capture" in shown
+
+
 def test_components_that_do_not_fit_are_counted() -> None:
     assert "lines more" in drawn(live_screen(picture(*MANY), EVENTS, 30))
 
