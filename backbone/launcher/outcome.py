@@ -8,16 +8,22 @@ from typing import Protocol
 
 from backbone.bus.interface import Bus, Clock
 from backbone.creator.messages import EndedBy, ProcessEnded, StartFailed
+from backbone.picture.words import NAMES_SHOWN, counted_names
 
 
 def with_signals(ended: Sequence[ProcessEnded]) -> str:
-    """Return the components with the signals that ended them, for people; empty: none.
+    """Return the components with the signals that ended them, for people; if these are many, by signal; empty: none.
 
     Example:
         >>> with_signals([ProcessEnded("spin", EndedBy.SIGKILL, 0)])
         'needed a signal to end: spin (sigkill)'
     """
-    return f"needed a signal to end: {', '.join(f'{end.name} ({end.by})' for end in ended)}" if ended else ""
+    if len(ended) <= NAMES_SHOWN:
+        told = ", ".join(f"{end.name} ({end.by})" for end in ended)
+    else:
+        by = {signal: [end.name for end in ended if end.by is signal] for signal in EndedBy}
+        told = ", ".join(f"{counted_names(names)} by {signal}" for signal, names in by.items() if names)
+    return f"needed a signal to end: {told}" if ended else ""
 
 
 @dataclass
