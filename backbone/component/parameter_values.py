@@ -24,4 +24,8 @@ def parameters_from(values: Mapping[str, object], kind: type[Parameters], of: st
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:
-        raise WrongParameter(f"{of}: {error}" if of else str(error)) from None
+        if not of:
+            raise WrongParameter(str(error)) from None
+        names = ", ".join(field.encode_name for field in msgspec.structs.fields(kind))
+        remedy = f"Its parameters are {names or 'none'}; give each a value of its type."
+        raise WrongParameter(f"{of}: {error}", remedy=remedy) from None
