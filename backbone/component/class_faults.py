@@ -38,6 +38,7 @@ def class_faults(kind: type) -> Iterator[str]:
     yield from _of_names(kind)
     yield from _of_constructors(kind)
     yield from _of_parameters(kind)
+    yield from _of_answers(kind)
 
 
 def fault_of_method(name: str, own: typing.Any, base: typing.Any, whose: str) -> Iterator[str]:
@@ -133,6 +134,14 @@ def _of_constructors(kind: type) -> Iterator[str]:
 
 def _is_protocol(kind: type) -> bool:
     return bool(vars(kind).get("_is_protocol"))
+
+
+def _of_answers(kind: type) -> Iterator[str]:
+    """Yield a fault if the class accepts questions, and only the class that declares ``answer`` would answer them."""
+    accepted = getattr(kind, "accepts", None)
+    if accepted is not None and sum("answer" in vars(one) for one in kind.__mro__) == 1:
+        asked = getattr(accepted, "__name__", accepted)
+        yield f"accepts has {asked}, and no answer replies; write 'async def answer(self, asked)'"
 
 
 def _of_parameters(kind: type) -> Iterator[str]:

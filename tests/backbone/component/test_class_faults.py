@@ -10,10 +10,13 @@ import pytest
 from backbone.bus.interface import Bus, Clock
 from backbone.component.class_faults import class_faults
 from backbone.component.class_path import WrongClassPath, load_class
+from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
+from backbone.component.messages import AskState
 from backbone.mission.class_facts import shipped_classes
 from backbone.mission.class_probe import facts_of
 from backbone.shipped import is_shipped
+from backbone.wire import Envelope, Message
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.children import Children
 from resource_pool.arc_client import Frame
@@ -121,6 +124,18 @@ class Simple(Quiet):
         super().__init__()  # type: ignore[call-arg]
 
 
+class Unanswering(Component[NoParameters]):
+    accepts = AskState
+
+    async def handle(self, asked: Envelope[Message]) -> Message:
+        return asked.body
+
+
+class Answering(Unanswering):
+    async def answer(self, asked: Envelope[Message]) -> Message:
+        return asked.body
+
+
 class Careful(Quiet):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         Quiet.__init__(self, launch, bus, clock)
@@ -185,6 +200,10 @@ class Read(Behavior[Speed]):
         (Swapped, "satrt looks like start misspelt, " + RENAME.format("start")),
         (Dropped, "rles looks like rules misspelt, " + RENAME.format("rules")),
         (Dangerous, "make_save looks like make_safe misspelt, " + RENAME.format("make_safe")),
+        (
+            Unanswering,
+            "accepts has AskState, and no answer replies; write 'async def answer(self, asked)'",
+        ),
         (Forgetful, FORGOTTEN),
         (Heir, FORGOTTEN),
         (Hasty, "Untyped.speed_m_s has no type, so it is no field; write speed_m_s: float = 0.1"),
@@ -203,7 +222,7 @@ def test_a_command_with_a_field_without_a_type_is_refused_by_check() -> None:
     assert facts_of(f"{__name__}:Blinker").failure == "Blink.times has no type, so it is no field; write times: int = 3"
 
 
-@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful, Spelt, Similar, Helped])
+@pytest.mark.parametrize("kind", [Quiet, Passing, Read, Careful, Spelt, Similar, Helped, Answering])
 def test_a_class_that_can_work_has_no_fault(kind: type) -> None:
     assert list(class_faults(kind)) == []
 
