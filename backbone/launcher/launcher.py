@@ -58,6 +58,7 @@ from backbone.mission.model import MissionDescription
 from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.naming import Subsystem, address, component_of
+from backbone.picture.words import starts_line
 from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
 from backbone.run_files import RunFolderRemoved
 from backbone.waiting import end_tasks, first_of
@@ -252,9 +253,7 @@ class Launcher(Component[NoParameters]):
     def _being_started(self) -> str:
         """Return the components that the start waits for, with their feedback."""
         processes = self._health_watch.picture.processes
-        doing = {name: processes[name].doing for name in self._wishes.awaited if name in processes}
-        starts = [f"{name} ({doing[name]})" if doing.get(name) else name for name in sorted(self._wishes.awaited)]
-        return f"starts {', '.join(starts)}" if starts else "starts its services"
+        return starts_line({one: processes[one].doing if one in processes else "" for one in self._wishes.awaited})
 
     async def drain(self) -> None:
         """Stop the mission in reverse order of its start, then the core services except the nameserver."""

@@ -138,9 +138,29 @@ def counted_names(names: Collection[str]) -> str:
         >>> counted_names({"scout10", "scout9"})
         '2 components (scout9, scout10)'
     """
-    names = sorted(names, key=reading_order)
+    return f"{counted(len(names), 'component')} ({_first(sorted(names, key=reading_order))})"
+
+
+def starts_line(doing: Mapping[str, str]) -> str:
+    """Return the components that are being started, those that report something first.
+
+    Args:
+        doing: Component → its feedback; empty: it reports nothing yet.
+
+    Example:
+        >>> starts_line({"scout10": "", "scout9": "", "world": "connecting"})
+        'starts world (connecting), scout9, scout10'
+        >>> starts_line({f"scout{number}": "" for number in range(60)})
+        'starts scout0, scout1, scout2, scout3, scout4, scout5, scout6, scout7 and 52 more'
+    """
+    names = sorted(doing, key=lambda name: (not doing[name], reading_order(name)))
+    starts = [f"{name} ({doing[name]})" if doing[name] else name for name in names]
+    return f"starts {_first(starts)}" if starts else "starts its services"
+
+
+def _first(names: Sequence[str]) -> str:
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
-    return f"{counted(len(names), 'component')} ({', '.join(names[:NAMES_SHOWN])}{more})"
+    return ", ".join(names[:NAMES_SHOWN]) + more
 
 
 def stop_line(name: str, stop: StandingStop, now_s: float) -> str:
