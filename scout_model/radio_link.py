@@ -144,7 +144,7 @@ def decode(payload: bytes) -> Packet:
 
     Example:
         >>> decode(encode_drive(1.0, -1.0))
-        Drive(left_rad_s=1.0, right_rad_s=-1.0)
+        DrivePacket(left_rad_s=1.0, right_rad_s=-1.0)
     """
     command, values = payload[:1], payload[1:]
     if command == b"D":

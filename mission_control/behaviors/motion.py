@@ -88,7 +88,7 @@ def read_places(text: str) -> list[FloorPoint]:
 
     Example:
         >>> read_places("1,1 3.5,0.5")
-        [Place(x_m=1.0, y_m=1.0), Place(x_m=3.5, y_m=0.5)]
+        [FloorPoint(x_m=1.0, y_m=1.0), FloorPoint(x_m=3.5, y_m=0.5)]
     """
     places = []
     for pair in text.split():

@@ -18,7 +18,7 @@ def inside(orders: Sequence[Order], floor: FloorPlan | None) -> list[Order]:
 
     Example:
         >>> wide = [Order(OrderKind.GO_TO, "scout1", -0.25, 1.0), Order(OrderKind.GO_TO, "scout2", 0.25, 1.0)]
-        >>> [each.x_m for each in inside(wide, FloorPlan(4.0, 3.0))]
+        >>> [round(each.x_m, 3) for each in inside(wide, FloorPlan(4.0, 3.0))]
         [0.3, 0.8]
     """
     places = [order for order in orders if order.kind is OrderKind.GO_TO]
