@@ -18,7 +18,7 @@ from typing import assert_never
 
 import msgspec
 
-from backbone.authentication import NoSecret, dictionary_of
+from backbone.authentication import SOCKET, NoSecret, dictionary_of
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.bus.zenoh_threads import threads_of_a_hub
@@ -39,6 +39,7 @@ from backbone.nameserver.messages import (
 from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Instruction, Introduce, Registry
 from backbone.nameserver.stops_file import UNREADABLE, StopsFile
 from backbone.naming import IllegalName, component_of, is_component, read_claim
+from backbone.operating_system.lingering import ignore_lingering
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -84,6 +85,8 @@ class Nameserver(Component[NameserverParameters]):
             raise NoSecret(f"the hub would listen at {', '.join(listen)} without a secret")
         config = hub_config([launch.endpoint, *listen], dictionary_file=dictionary_file)
         threads_of_a_hub()
+        if any(not endpoint.startswith(SOCKET) for endpoint in (launch.endpoint, *listen)):
+            ignore_lingering()
         bus = ZenohBus.open(launch.mission, launch.address, clock, config)
         bus.use_host(launch.run_directory)
         return bus

@@ -6,18 +6,28 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import os
+import subprocess
 import sys
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.zenoh_threads import threads_of_a_hub
 from backbone.errors import LinkError
 from backbone.keys import Conversation
+from backbone.operating_system.lingering import ignore_lingering
 from backbone.rc_manager.messages import Beat, Done, SetIdle
 from backbone.wire import Envelope, Message
 
+if TYPE_CHECKING:
+    from namespaces import NetworkHost
+
 MISSION, HUB, BEAT_EVERY_S, ASKED_EVERY_S = "cable", "backbone/hub", 0.05, 0.05
+CROWD = 16  # more than the threads through which a hub receives
 ANSWERED_WITHIN_S = 1.0  # as long as an answer may take on a busy machine
 
 
@@ -40,6 +50,8 @@ async def is_answered(bus: ZenohBus, address: str) -> bool:
 
 async def hub(endpoint: str, _number: int) -> None:
     """Answer until killed."""
+    threads_of_a_hub()
+    ignore_lingering()
     bus = ZenohBus.open(MISSION, HUB, MissionClock.started_now(), hub_config([endpoint]))
     bus.serve(HUB, SetIdle, answer)
     say("ready")
@@ -84,6 +96,23 @@ async def asker(endpoint: str, number: int) -> None:
 def say(line: str) -> None:
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
+
+
+@contextlib.contextmanager
+def playing(role: str, host: NetworkHost, endpoint: str) -> Iterator[subprocess.Popen[str]]:
+    """Give a role when it is ready; it is killed afterwards."""
+    command = [sys.executable, __file__, role, endpoint, str(CROWD)]
+    with host.start(command, dict(os.environ), stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        try:
+            assert said_by(process) == "ready"
+            yield process
+        finally:
+            process.kill()
+
+
+def said_by(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
 
 
 if __name__ == "__main__":

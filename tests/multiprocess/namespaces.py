@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import json
 import os
 import shutil
 import signal
 import subprocess
-from collections.abc import Iterator
-from dataclasses import dataclass
+import sys
+from collections.abc import Collection, Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import poor_link
 import psutil
 import pytest
+from poor_link import INNER, OUTER, Weather
 
 SUBNET = "10.99.7"
 _networks = itertools.count()
@@ -34,6 +38,7 @@ class NetworkHost:
         address: Its IP address.
         folder: A folder of its own; commands run in it.
         switch: The namespace of the switch it hangs on.
+        link: Carries the frames of a machine behind a poor link; None: a cable.
     """
 
     name: str
@@ -41,6 +46,7 @@ class NetworkHost:
     address: str
     folder: Path
     switch: str
+    link: subprocess.Popen[str] | None = None
 
     def start(self, command: list[str], environment: dict[str, str], **more: object) -> subprocess.Popen[str]:
         """Start a command on this machine; it speaks with others over the switch only."""
@@ -61,6 +67,12 @@ class NetworkHost:
     def heal(self) -> None:
         """Put the cable back."""
         _ip("-n", self.switch, "link", "set", self._port, "up")
+
+    def change_weather(self, weather: Weather) -> None:
+        """Let the poor link of this machine lose, delay, limit or stall frames from now on."""
+        assert self.link is not None, f"{self.name} hangs on a cable"
+        assert self.link.stdin is not None
+        print(json.dumps(asdict(weather)), file=self.link.stdin, flush=True)
 
     def processes(self) -> list[psutil.Process]:
         """Return what runs on this machine."""
@@ -91,9 +103,10 @@ class NetworkHost:
 
 
 @contextlib.contextmanager
-def hosts_on_a_switch(folder: Path, *names: str) -> Iterator[dict[str, NetworkHost]]:
+def hosts_on_a_switch(folder: Path, *names: str, poor: Collection[str] = ()) -> Iterator[dict[str, NetworkHost]]:
     """Give machines of these names, each with an address, joined by a switch; nothing of them is left afterwards.
 
+    Between a machine in ``poor`` and the switch is a poor link, with good weather at first.
     The test is skipped where namespaces cannot be made.
     """
     if os.geteuid() != 0:
@@ -111,23 +124,48 @@ def hosts_on_a_switch(folder: Path, *names: str) -> Iterator[dict[str, NetworkHo
         _make_or_skip("-n", switch, "link", "add", "bridge", "type", "bridge")
         _ip("-n", switch, "link", "set", "bridge", "up")
         for number, name in enumerate(names, start=1):
-            host = NetworkHost(name, f"{network}-{name}", f"{SUBNET}.{number}", folder / name, switch)
+            link = _poor_link(network, name, made) if name in poor else None
+            host = NetworkHost(name, f"{network}-{name}", f"{SUBNET}.{number}", folder / name, switch, link)
+            hosts[name] = host
             host.folder.mkdir()
             _plug_in(host)
-            hosts[name] = host
         yield hosts
     finally:
         for host in hosts.values():
             host.die()
+            if host.link is not None:
+                host.link.kill()
+                host.link.communicate()
         for namespace in reversed(made):
             _ip("netns", "del", namespace)
 
 
+def _poor_link(network: str, name: str, made: list[str]) -> subprocess.Popen[str]:
+    """Make a namespace with both ends of a link, and start the program that carries frames between them."""
+    space = f"{network}-{name}-link"
+    _make_or_skip("netns", "add", space)
+    made.append(space)
+    for near, far in ((INNER, "eth0"), (OUTER, "port")):
+        _ip("-n", space, "link", "add", near, "type", "veth", "peer", "name", far)
+        _ip("-n", space, "link", "set", near, "up")
+    words = [IP, "netns", "exec", space, sys.executable, poor_link.__file__, "7", "eth0", "port"]
+    link = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert link.stdout is not None
+    if link.stdout.readline() != "ready\n":
+        link.kill()
+        pytest.skip("this machine carries no frames between namespaces")
+    return link
+
+
 def _plug_in(host: NetworkHost) -> None:
     port = f"to-{host.name}"
-    _make_or_skip(
-        "-n", host.switch, "link", "add", port, "type", "veth", "peer", "name", "eth0", "netns", host.namespace
-    )
+    if host.link is None:
+        _make_or_skip(
+            "-n", host.switch, "link", "add", port, "type", "veth", "peer", "name", "eth0", "netns", host.namespace
+        )
+    else:
+        _ip("-n", f"{host.namespace}-link", "link", "set", "eth0", "netns", host.namespace)
+        _ip("-n", f"{host.namespace}-link", "link", "set", "port", "netns", host.switch, "name", port)
     _ip("-n", host.switch, "link", "set", port, "master", "bridge", "up")
     _ip("-n", host.namespace, "link", "set", "lo", "up")
     _ip("-n", host.namespace, "address", "add", f"{host.address}/24", "dev", "eth0")

@@ -4,39 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from namespaces import NetworkHost, hosts_on_a_switch
+from bus_roles import playing, said_by
+from namespaces import hosts_on_a_switch
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
-ROLES = Path(__file__).parent / "bus_roles.py"
-CROWD = 16  # more than the threads through which a hub receives
 LEASE_S = 2.0
 BACK_WITHIN_S = 10.0
-
-
-@contextlib.contextmanager
-def playing(role: str, host: NetworkHost, endpoint: str) -> Iterator[subprocess.Popen[str]]:
-    """Give a role when it is ready; it is killed afterwards."""
-    command = [sys.executable, str(ROLES), role, endpoint, str(CROWD)]
-    with host.start(command, dict(os.environ), stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        try:
-            assert said_by(process) == "ready"
-            yield process
-        finally:
-            process.kill()
-
-
-def said_by(process: subprocess.Popen[str]) -> str:
-    assert process.stdout is not None
-    return process.stdout.readline().strip()
 
 
 @pytest.mark.thorough

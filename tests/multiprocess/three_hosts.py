@@ -15,7 +15,7 @@ import threading
 import time
 import uuid
 from collections import defaultdict
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -254,9 +254,9 @@ def mission_text(hosts: dict[str, NetworkHost]) -> str:
 
 
 @contextlib.contextmanager
-def machines(folder: Path, *options: str) -> Iterator[ThreeHosts]:
+def machines(folder: Path, *options: str, poor: Collection[str] = ()) -> Iterator[ThreeHosts]:
     """Give three machines, with ``up`` and these options typed on base; nothing of them is left afterwards."""
-    with hosts_on_a_switch(folder, "base", "near", "far") as hosts:
+    with hosts_on_a_switch(folder, "base", "near", "far", poor=poor) as hosts:
         file = hosts["base"].folder / "mission.xml"
         file.write_text(mission_text(hosts))
         mission = ThreeHosts(hosts, {**os.environ, MARK: uuid.uuid4().hex}, file)
@@ -271,9 +271,9 @@ def machines(folder: Path, *options: str) -> Iterator[ThreeHosts]:
 
 
 @contextlib.contextmanager
-def mission_on_three_hosts(folder: Path, *options: str) -> Iterator[ThreeHosts]:
+def mission_on_three_hosts(folder: Path, *options: str, poor: Collection[str] = ()) -> Iterator[ThreeHosts]:
     """Give the mission when it is whole; take it down afterwards, and see that nothing is left on any machine."""
-    with machines(folder, *options) as mission:
+    with machines(folder, *options, poor=poor) as mission:
         for host in ("near", "far"):
             mission.type_what_up_prints(host)
         mission.wait(
