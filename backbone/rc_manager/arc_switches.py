@@ -44,6 +44,7 @@ class ArcSwitches:
         self._service, self._failures, self._context_switch = service, failures, context_switch
         self._rcs, self._grace_s = rcs, grace_s
         self._under_way: dict[str, asyncio.Task[None]] = {}
+        self._in_vain: dict[str, tuple[str, ...]] = {}
         self._times = SwitchTimes()
 
     def __contains__(self, arc: str) -> bool:
@@ -58,6 +59,14 @@ class ArcSwitches:
     def statistics(self) -> dict[str, float]:
         """Return numbers and times of switches."""
         return self._times.statistics()
+
+    def remedy(self, arc: str) -> str:
+        """Return the remedy for an ARC that did not open its gate; empty: its host and those of its RCs answer soon."""
+        return self._rcs.remedy_of_hosts(self._in_vain.get(arc, ()))
+
+    def forget(self, arc: str) -> None:
+        """Forget why the ARC did not open its gate, because it did so now or has ended."""
+        self._rcs.forget_hosts(self._in_vain.pop(arc, ())[:1])
 
     def connect(self, order: ConnectArc) -> None:
         """Connect the ARC to its RCs."""
@@ -86,6 +95,7 @@ class ArcSwitches:
         if vain is None:
             self._rcs.connected(order.epochs)
             self._failures.end(order.arc)
+            self.forget(order.arc)
             self._times.granted(order.epochs, order.arc, order.settle_s, self._service.clock.now_s())
             self._service.happened(Opened(order.arc))
             return
@@ -93,6 +103,8 @@ class ArcSwitches:
             self._rcs.failed(vain.failed)
         else:
             self._failures.begin(order.arc)
+            self._in_vain[order.arc] = (order.arc, *order.epochs)
+            self._rcs.measure_hosts(self._in_vain[order.arc])
         for rc in vain.unconfirmed:
             self._rcs.does_not_answer(rc)
         self._service.happened(OpenFailed(order.arc, vain.failed))

@@ -147,7 +147,9 @@ class ArcWatch:
             Absence(arc, since_s, why, f"waits until {until}", is_running=True)
             for arc, since_s, why, until in answers.unservable()
         ]
-        return never + self._failures.absences(answers.wanting(), "the RC manager connects it again")
+        return never + self._failures.absences(
+            answers.wanting(), "the RC manager connects it again", self._switches.remedy
+        )
 
     def remember(self, arc: str) -> None:
         """Know the ARC from now on: it asks for RCs."""
@@ -160,6 +162,7 @@ class ArcWatch:
         if (telling := self._telling.pop(arc, None)) is not None:
             telling.cancel()
         self._failures.forget(arc)
+        self._switches.forget(arc)
         return self._beats.forget(arc)
 
     def end_silent(self) -> None:

@@ -112,6 +112,20 @@ class RcWatch:
         host = self._hosts.remedy(rc) if self._failures.is_silent(rc) else ""
         return host or REMEDY.format(name=rc)
 
+    def remedy_of_hosts(self, names: Iterable[str]) -> str:
+        """Return the remedy for the first of these components on a full host or behind a slow link; empty: none is."""
+        return next(filter(None, map(self._hosts.remedy, names)), "")
+
+    def measure_hosts(self, names: Iterable[str]) -> None:
+        """Measure the round trips to the hosts of these components."""
+        for name in names:
+            self._service.start_task(self._measure_host(name), f"measure the host of {name}")
+
+    def forget_hosts(self, names: Iterable[str]) -> None:
+        """Forget what was measured for these components."""
+        for name in names:
+            self._hosts.forget(name)
+
     def missing(self) -> list[str]:
         """Return the RCs that do not run, sorted."""
         return sorted(self.resources.keys() - self.up - self._failing)

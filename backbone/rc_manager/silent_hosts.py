@@ -42,10 +42,10 @@ class SilentHosts:
 
     async def measure(self, rc: str) -> None:
         """Measure the round trip to the creator of the RC's host, and ask it for the load."""
-        self._measured.pop(rc, None)
         try:
             found = await self._bus.ask(NAMESERVER, Resolve(rc), Resolved, within_s=MEASURED_WITHIN_S)
         except (LinkError, Refusal):  # it is gone: its absence has other causes
+            self.forget(rc)
             return
         host, asked_s = found.component.host, self._clock.now_s()
         measured = _Measured(host, None)
@@ -53,6 +53,10 @@ class SilentHosts:
             cpu = await self._cpu(host)
             measured = _Measured(host, (self._clock.now_s() - asked_s) / self._clock.rate, cpu)
         self._measured[rc] = measured
+
+    def forget(self, name: str) -> None:
+        """Forget what was measured for this component."""
+        self._measured.pop(name, None)
 
     async def _cpu(self, host: str) -> float:
         creator = address(Subsystem.BACKBONE, creator_name(host))

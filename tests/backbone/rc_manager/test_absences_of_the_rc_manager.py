@@ -134,6 +134,32 @@ def test_an_arc_that_opens_in_vain_is_named_while_it_wants_time(pool: Any) -> No
     run_virtual(main())
 
 
+@pytest.mark.parametrize(("own_host", "remedy"), [("base", "check the link to here: a round trip"), ("here", "")])
+def test_the_remedy_for_an_arc_that_opens_in_vain_names_the_slow_link_to_its_rcs(
+    pool: Any, own_host: str, remedy: str
+) -> None:
+    """A receiver behind a link with a round trip of 0.4 s could not be tuned, and health named no remedy."""
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager(own_host)):
+            odd, creator = await here.arc("odd"), here.network.join("backbone/creator-here", here.clock)
+
+            async def answer(_asked: Envelope[AskLoad]) -> Message:
+                await here.clock.sleep_s(0.4)
+                return HostLoad("here", [], 0.5, 0.5, 2, 3)
+
+            creator.serve("backbone/creator-here", AskLoad, answer)
+            odd.cannot_open = NotReady("odd could not be prepared: left did not answer")
+            await odd.ask_for(request("odd", "left"))
+            await here.clock.sleep_s(5.0)
+            found = (await _absent(odd))["odd"].remedy
+            assert found.startswith(remedy)
+            assert bool(found) is bool(remedy)
+            await creator.close()
+
+    run_virtual(main())
+
+
 def test_an_arc_that_the_radio_could_not_serve_even_alone_is_named(pool: Any) -> None:
     async def main() -> None:
         async with pool() as here, here.beside(here.manager()):
