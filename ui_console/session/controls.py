@@ -125,6 +125,8 @@ class Controls:
         """Send one command and show its outcome; return True if it was applied."""
         if self._arc is None:
             return False
+        if self._moves_a_stopped_robot(self._arc, command):
+            return False
         sending = self._sending(self._arc, command)
         if sending is None:
             return True
@@ -145,6 +147,25 @@ class Controls:
         self._record_applied(command, applied)
         show(CommandApplied(applied.at_s, applied.rc, applied.epoch, applied.command, applied.values, took_s))
         return True
+
+    def _moves_a_stopped_robot(self, arc: ArcClient, command: Command) -> bool:
+        """Refuse motion of a robot that this console stopped, because the stop may reach the robot later."""
+        robot = arc.granted.robot if arc.granted is not None else ""
+        if robot not in self._console.feed.unanswered or not self._moves(command):
+            return False
+        self.require_let_go()
+        stopped = EmergencyStopped(f"{robot} has not confirmed the stop from here yet", rc=robot, is_stopped=True)
+        self._console.show(failed(self._console.clock.now_s(), stopped))
+        return True
+
+    def _moves(self, command: Command) -> bool:
+        match command:
+            case GiveWish(word):
+                return self.abilities is None or self.abilities.moves(word)
+            case HaltWish():
+                return False
+            case _:
+                return True
 
     def _sending(self, arc: ArcClient, command: Command) -> Awaitable[Applied] | None:
         """Return the coroutine that sends a command; None: the ARC has no command to halt."""

@@ -197,6 +197,7 @@ class ConsoleFeed:
         return _Answered(lambda error: self._show(failed(self._clock.now_s(), error)))
 
     async def _stop(self, robot: str, reason: str, user: str) -> bool:
+        self.unanswered.begin(robot)
         with self._showing_failure():
             try:
                 stop = await stop_robot(self._bus, robot, reason, user, self._clock)
@@ -204,6 +205,9 @@ class ConsoleFeed:
                 self.unanswered.add(robot, reason, user)
                 unsure = f"{robot} did not confirm the stop, which this console repeats while it runs"
                 raise LinkError(f"{unsure}: {error}") from error
+            except (Refusal, asyncio.CancelledError):
+                self.unanswered.answered(robot)
+                raise
             self.unanswered.answered(robot)
             self._hear(stop)
             return stop.is_stopped and stop.is_confirmed  # it may be lifted already, or its radio was silent

@@ -14,7 +14,7 @@ from backbone.launcher.endings import ExitCode
 from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
 from backbone.waiting import set_within
-from resource_pool.arc_client import StopState, Suspended, SwappedOut
+from resource_pool.arc_client import EmergencyStopped, StopState, Suspended, SwappedOut
 from ui_console.model import events
 from ui_console.model.driving import Command, GiveBack, GiveWish, HaltWish, Motion, OrderWish, StopAll, StopRobot
 from ui_console.model.orders import OrderState
@@ -59,6 +59,8 @@ class ScriptDriver:
             self._player.require_let_go()
         if isinstance(said, StopState) and (said.is_stopped or self._stopped):
             self._stopped = said.is_stopped
+            self._player.require_let_go()
+        if isinstance(event, events.CommandRefused) and event.code == EmergencyStopped.code:
             self._player.require_let_go()
         if isinstance(event, events.CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
             self._failed = True

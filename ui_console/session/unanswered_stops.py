@@ -35,7 +35,16 @@ class UnansweredStops:
     ) -> None:
         self._bus, self._clock, self._heard, self._showing_refusal = bus, clock, heard, showing_refusal
         self._stops: dict[str, tuple[str, str]] = {}
+        self._pending: set[str] = set()
         self._news = asyncio.Event()
+
+    def __contains__(self, robot: str) -> bool:
+        """Return whether this console stopped the robot and has no answer yet."""
+        return robot in self._pending
+
+    def begin(self, robot: str) -> None:
+        """Count the robot as stopped without an answer from now on."""
+        self._pending.add(robot)
 
     def add(self, robot: str, reason: str, user: str) -> None:
         """Send this stop again until it is answered."""
@@ -43,8 +52,9 @@ class UnansweredStops:
         self._news.set()
 
     def answered(self, robot: str) -> None:
-        """Send the robot no further stop: its RC answered one."""
+        """Send the robot no further stop: its RC answered one, or the console gave up the first."""
         self._stops.pop(robot, None)
+        self._pending.discard(robot)
 
     async def run(self) -> None:
         """Send what is not answered; until cancelled."""

@@ -323,3 +323,51 @@ def test_a_script_stops_robots_before_its_grant_and_at_once(scripted: Callable[[
         await playing
 
     scripted(scene)
+
+
+def test_a_robot_that_does_not_answer_its_stop_gets_no_motion_from_the_console_that_stopped_it(
+    stage: Callable[[Scene], None],
+) -> None:
+    """The stop was lost on a cut link and sent again half a second after it; the motion came before the stop."""
+
+    async def scene(on: HeldRobot) -> None:
+        away = on.placer.network.servers.pop("resource_pool/scout1")
+        assert not await on.console.stop_robot("scout1", "a child")
+        on.arc.commands.clear()
+        await on.clock.sleep_s(KEYS_LET_GO_S + REPEAT_S)
+        await on.hold_key(1.0)
+        assert not await on.console.do(GiveWish("jump"))
+        assert {type(command) for _at_s, _epoch, command in on.arc.commands} <= {ArcHalt}
+        assert await on.console.do(HaltWish())
+        on.placer.network.servers["resource_pool/scout1"] = away
+        await on.clock.sleep_s(3.0)
+        assert on.latch.state.is_stopped
+        on.lift()
+        await on.clock.sleep_s(KEYS_LET_GO_S + REPEAT_S)
+        await on.hold_key(1.0)
+        assert on.drives()
+
+    stage(scene)
+
+
+def test_a_script_moves_nothing_after_a_stop_of_its_own_robot_that_is_not_answered(
+    scripted: Callable[[Scene], None],
+) -> None:
+    async def scene(on: HeldRobot) -> None:
+        drive, stop = '{"at_s":0,"left_rad_s":4,"right_rad_s":4}', '{"stop_robot":"scout1"}'
+        playing = asyncio.create_task(play(on, [(0.0, drive), (2.0, stop), (6.0, None)]))
+        await on.held()
+        await on.clock.sleep_s(1.0)
+        assert on.drives()
+        away = on.placer.network.servers.pop("resource_pool/scout1")
+        await on.clock.sleep_s(1.2)
+        on.arc.commands.clear()
+        await on.clock.sleep_s(2.0)
+        assert not on.drives()
+        on.placer.network.servers["resource_pool/scout1"] = away
+        await on.clock.sleep_s(1.0)
+        assert on.latch.state.is_stopped
+        code, _ = await playing
+        assert code == 5
+
+    scripted(scene)
