@@ -17,18 +17,17 @@ from typing import Annotated, Any, cast
 import typer
 
 from backbone.command_line.asking_commands import log, story, why
+from backbone.command_line.at_mission import AtMission
 from backbone.command_line.message_commands import inject, top, watch
 from backbone.command_line.module_commands import swap
 from backbone.command_line.options import (
     AsJson,
     CommandTable,
     ComponentName,
-    Endpoint,
     MissionFile,
     MissionName,
     SecretFile,
     Version,
-    chosen,
     complete_name,
     complete_resource,
     complete_type,
@@ -43,6 +42,7 @@ from backbone.command_line.options import (
 from backbone.command_line.recording_commands import compare, record, recording, replay
 from backbone.command_line.tool_commands import bridge, metrics
 from backbone.command_line.tree_commands import tree
+from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode, say
 from backbone.spoken import counted
 
@@ -174,17 +174,16 @@ def up(
 
 
 @app.command()
+@AtMission
 def status(
+    where: Where,
     as_json: AsJson = False,
     watch: Annotated[bool, typer.Option("--watch", help="Keep showing it.")] = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Show health, components by subsystem, who holds which resource, and the schedule; 6 if the mission failed."""
     from backbone.command_line.status import Display, JsonLines, show_status
 
-    where, display = chosen(mission, connect, secret_file), cast("Display", JsonLines())
+    display = cast("Display", JsonLines())
     if not as_json:
         from backbone.command_line.tables import MissionTables
 
@@ -193,7 +192,9 @@ def status(
 
 
 @app.command()
+@AtMission
 def components(
+    where: Where,
     type_: Annotated[
         str,
         typer.Option(
@@ -201,47 +202,39 @@ def components(
         ),
     ] = "",
     as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Show the component types of the mission: class, needs, numbers allowed and running; with --type the abilities."""
     from backbone.command_line.inventory import print_types
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: print_types(where, type_, as_json=as_json, width=_width()))
 
 
 @app.command()
+@AtMission
 def resources(
+    where: Where,
     name: Annotated[str, typer.Argument(autocompletion=complete_resource, help="Only this resource.")] = "",
     changes: Annotated[
         bool, typer.Option("--changes", help="Also the shares before and after each of the last re-plannings.")
     ] = False,
     as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Show the resources: host, capacity, holder, utilization over 1 and 10 minutes."""
     from backbone.command_line.inventory import print_resources
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: print_resources(where, name, changes=changes, as_json=as_json, width=_width()))
 
 
 @app.command()
+@AtMission
 def load(
+    where: Where,
     for_s: Annotated[float, typer.Option("--for", min=0.1, max=3600.0, help="Seconds between the two readings.")] = 1.0,
     as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Show the processor time of each robot, each module and each process."""
     from backbone.command_line.load_table import print_loads
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: print_loads(where, for_s, as_json=as_json, width=_width()))
 
 
@@ -251,7 +244,9 @@ app.command()(log)
 
 
 @app.command()
+@AtMission
 def start(
+    where: Where,
     type_: Annotated[
         str, typer.Argument(metavar="TYPE", autocompletion=complete_type, help="Component type of the mission.")
     ],
@@ -260,35 +255,28 @@ def start(
     parameter: Annotated[
         list[str] | None, typer.Option("--parameter", help="NAME=VALUE, value as JSON or text; repeatable.")
     ] = None,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Start one more component through the placer."""
     from backbone.command_line.ordering import start_component
     from backbone.placer.messages import Start
 
-    where = chosen(mission, connect, secret_file)
     order = Start(type_, name, dict(map(named_value, parameter or [])), host)
     run(lambda: start_component(where, order))
 
 
 @app.command()
-def stop(
-    name: ComponentName,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
+@AtMission
+def stop(where: Where, name: ComponentName) -> None:
     """Stop one component; it is not restarted."""
     from backbone.command_line.ordering import stop_component
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: stop_component(where, name))
 
 
 @app.command(name="set", context_settings={"ignore_unknown_options": True})  # a priority may be below 0
+@AtMission
 def set_(
+    where: Where,
     name: Annotated[
         str,
         typer.Argument(
@@ -303,9 +291,6 @@ def set_(
     ] = None,
     value: Annotated[str | None, typer.Argument(help="The new value, JSON or text; left out: show it.")] = None,
     as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Set priority, parent or a run time of an owner of ARCs, or any parameter; without a value show it."""
     if value is not None and as_json:
@@ -313,7 +298,6 @@ def set_(
 
     from backbone.command_line.ordering import print_attributes, set_attribute
 
-    where = chosen(mission, connect, secret_file)
     if parameter is not None and value is not None:
         run(lambda: set_attribute(where, name, parameter, json_or_text(value)))
     run(lambda: print_attributes(where, name, parameter, as_json=as_json))

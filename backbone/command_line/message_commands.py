@@ -9,7 +9,9 @@ from typing import Annotated
 
 import typer
 
-from backbone.command_line.options import MOST_LINES, AsJson, Endpoint, For, MissionName, SecretFile, chosen, run
+from backbone.command_line.at_mission import AtMission
+from backbone.command_line.options import MOST_LINES, AsJson, For, run
+from backbone.command_line.where import Where
 
 KeyGlobs = Annotated[
     list[str] | None,
@@ -17,7 +19,9 @@ KeyGlobs = Annotated[
 ]
 
 
+@AtMission
 def watch(
+    where: Where,
     keys: KeyGlobs = None,
     field: Annotated[str, typer.Option("--field", help="Only this field, as 'x_m' or 'rcs.0.rc'.")] = "",
     rate: Annotated[
@@ -28,50 +32,42 @@ def watch(
     ] = None,
     for_s: For = None,
     as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Print the messages at these keys of a mission that is up, questions and answers too, until Ctrl-C."""
     from backbone.command_line import watching
     from backbone.operating_system.own_process import go_behind_others
 
-    where = chosen(mission, connect, secret_file)
     wanted = watching.Watched(tuple(keys or ()), field, most, for_s, as_json)
     go_behind_others()
     run(lambda: watching.top(where, wanted, once=False) if rate else watching.watch(where, wanted))
 
 
+@AtMission
 def top(
+    where: Where,
     keys: KeyGlobs = None,
     for_s: Annotated[float, typer.Option("--for", min=0.1, max=1e6, help="Seconds to listen.")] = 2.0,
     as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Print rates and sizes of the keys of a mission that is up, the busiest first."""
     from backbone.command_line import watching
     from backbone.operating_system.own_process import go_behind_others
 
-    where = chosen(mission, connect, secret_file)
     wanted = watching.Watched(tuple(keys or ()), for_s=for_s, as_json=as_json)
     go_behind_others()
     run(lambda: watching.top(where, wanted, once=True))
 
 
+@AtMission
 def inject(
+    where: Where,
     key: Annotated[str, typer.Argument(metavar="KEY", help="As 'watch' prints it; a question's ends with '/ask'.")],
     message: Annotated[str, typer.Argument(metavar="JSON", help="An object with 'schema' and the message's fields.")],
     within_s: Annotated[
         float, typer.Option("--within", min=0.1, max=600.0, help="Seconds to wait for the answer to a question.")
     ] = 5.0,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Send a message on the bus of a mission that is up, checked against its schema; the log names its sender."""
     from backbone.command_line.injecting import inject as inject_message
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: inject_message(where, key, message, within_s))

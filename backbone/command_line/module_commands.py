@@ -9,15 +9,9 @@ from typing import Annotated
 
 import typer
 
-from backbone.command_line.options import (
-    Endpoint,
-    MissionName,
-    SecretFile,
-    chosen,
-    complete_exchangeable,
-    named_value,
-    run,
-)
+from backbone.command_line.at_mission import AtMission
+from backbone.command_line.options import complete_exchangeable, named_value, run
+from backbone.command_line.where import Where
 
 LONGEST_S = 3_600.0  # chosen: an hour; a longer proof is not useful
 PROVE_S = 5.0  # as in exchange
@@ -25,7 +19,9 @@ READY_WITHIN_S = 10.0  # as in exchange
 SILENT_S = 1.0  # as in exchange
 
 
+@AtMission
 def swap(
+    where: Where,
     name: Annotated[
         str,
         typer.Argument(
@@ -58,15 +54,12 @@ def swap(
             help="Modules: mission seconds without an output that the old one has.",
         ),
     ] = SILENT_S,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Exchange a module, a behavior or a driver while it runs: the old one comes back if the new one fails (exit 5)."""
     from backbone.command_line.swapping import swap_class
     from backbone.exchange import SwapModule
     from backbone.mission_log.operators import login_name
 
-    where, values = chosen(mission, connect, secret_file), dict(map(named_value, parameter or []))
+    values = dict(map(named_value, parameter or []))
     asked = SwapModule(name, class_path, values, prove_s, ready_within_s, silent_s, login_name())
     run(lambda: swap_class(where, asked))

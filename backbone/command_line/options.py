@@ -132,11 +132,11 @@ def run(work: Callable[[], Awaitable[int]]) -> NoReturn:
     raise typer.Exit(exit_code_of(work))
 
 
-def chosen(mission: str | None, endpoint: str | None, secret_file: Path | None) -> Where:
+def chosen(mission: MissionName = None, connect: Endpoint = None, secret_file: SecretFile = None) -> Where:
     """Return the mission that the options name; a hub elsewhere needs the mission's name."""
-    if endpoint is not None and mission is None:
+    if connect is not None and mission is None:
         raise typer.BadParameter("--connect needs --mission NAME")
-    return Where(legal_name(mission) if endpoint is not None else mission, endpoint, secret_file)
+    return Where(legal_name(mission) if connect is not None else mission, connect, secret_file)
 
 
 def legal_name(value: str | None) -> str | None:

@@ -9,9 +9,11 @@ from typing import Annotated
 
 import typer
 
+from backbone.command_line.at_mission import AtMission
 from backbone.command_line.extras import needing_extras
-from backbone.command_line.options import MOST_PORT, Endpoint, MissionName, SecretFile, chosen, run
+from backbone.command_line.options import MOST_PORT, run
 from backbone.command_line.recording_commands import Keys
+from backbone.command_line.where import Where
 
 BRIDGE_PORT = 8765  # where Foxglove looks first
 METRICS_PORT = 9464  # OpenTelemetry's port for Prometheus
@@ -21,30 +23,26 @@ Host = Annotated[
 ]
 
 
+@AtMission
 def bridge(
+    where: Where,
     keys: Keys = None,
     host: Host = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", min=1, max=MOST_PORT, help="Port to listen at.")] = BRIDGE_PORT,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Show a mission live in Foxglove or Lichtblick: cameras, robots in their room, all messages; until Ctrl-C."""
     with needing_extras():
         from backbone.command_line.bridging import bridge as show_live
-    where = chosen(mission, connect, secret_file)
     run(lambda: show_live(where, host, port, tuple(keys or ())))
 
 
+@AtMission
 def metrics(
+    where: Where,
     host: Host = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", min=1, max=MOST_PORT, help="Port to listen at.")] = METRICS_PORT,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Serve metrics to Prometheus: holding and waiting times of resources, switches, drops; until Ctrl-C."""
     with needing_extras():
         from backbone.command_line.metrics_work import serve_metrics
-    where = chosen(mission, connect, secret_file)
     run(lambda: serve_metrics(where, host, port))

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from backbone.command_line.at_mission import AtMission
 from backbone.command_line.options import (
     AsJson,
     CommandTable,
@@ -21,6 +22,7 @@ from backbone.command_line.options import (
     json_or_text,
     run,
 )
+from backbone.command_line.where import Where
 
 tree = typer.Typer(
     cls=CommandTable,
@@ -57,7 +59,9 @@ def show(
 
 
 @tree.command()
+@AtMission
 def add(
+    where: Where,
     branch: BranchFile,
     below: Annotated[
         str, typer.Option("--below", autocompletion=complete_behavior, help="Its parent; default: it is a root.")
@@ -66,34 +70,26 @@ def add(
         int, typer.Option("--place", min=0, max=MOST_PLACES, help="Number among its siblings, from 1; 0: the last.")
     ] = 0,
     seen: Seen = None,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Add a branch to the tree and start it when its parent wants it."""
     from backbone.command_line.tree_orders import add_branch
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: add_branch(where, branch, below, place, seen))
 
 
 @tree.command()
-def remove(
-    name: BehaviorName,
-    seen: Seen = None,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
+@AtMission
+def remove(where: Where, name: BehaviorName, seen: Seen = None) -> None:
     """End a behavior and its descendants, and remove them from the tree."""
     from backbone.command_line.tree_orders import remove_branch
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: remove_branch(where, name, seen))
 
 
 @tree.command()
+@AtMission
 def move(
+    where: Where,
     name: BehaviorName,
     parent: Annotated[
         str,
@@ -101,61 +97,46 @@ def move(
     ],
     place: Place = 0,
     seen: Seen = None,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Move a branch; below another parent, it ends and starts again."""
     from backbone.command_line.tree_orders import move_branch
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: move_branch(where, name, parent, place, seen))
 
 
 @tree.command()
-def replace(
-    name: BehaviorName,
-    branch: BranchFile,
-    seen: Seen = None,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
+@AtMission
+def replace(where: Where, name: BehaviorName, branch: BranchFile, seen: Seen = None) -> None:
     """End a behavior and its descendants, and start another branch in its place."""
     from backbone.command_line.tree_orders import replace_branch
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: replace_branch(where, name, branch, seen))
 
 
 @tree.command(name="set", context_settings={"ignore_unknown_options": True})  # a priority may be below 0
+@AtMission
 def set_(
+    where: Where,
     name: BehaviorName,
     parameter: Annotated[
         str, typer.Argument(help="priority, minimum_runtime_s, maximum_runtime_s, or a parameter of the behavior.")
     ],
     value: Annotated[str, typer.Argument(help="The new value, JSON or text.")],
     seen: Seen = None,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Set a value of a behavior, now and for each later start of it."""
     from backbone.command_line.tree_orders import set_value
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: set_value(where, name, parameter, json_or_text(value), seen))
 
 
 @tree.command()
+@AtMission
 def save(
+    where: Where,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The file; an existing file is replaced as a whole.")],
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
 ) -> None:
     """Write the mission file with all changes of the tree; comments and order stay."""
     from backbone.command_line.tree_orders import save_tree
 
-    where = chosen(mission, connect, secret_file)
     run(lambda: save_tree(where, file))
