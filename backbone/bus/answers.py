@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TypeVar, cast
 
 from backbone.bus.inbox import reply_reader_of
@@ -21,6 +22,30 @@ class NoInbox:
 
 Came = bytes | type[TooLate] | type[NoInbox] | None
 """The bytes of an answer; None: there is none, because the component is gone or a bug ended its answer."""
+
+
+class AnsweredByMessage(ABC):
+    """A question whose answer is a message, as are its refusal and the news that there is no answer."""
+
+    _is_answered = False
+
+    def answer(self, payload: bytes) -> None:
+        """Send the answer."""
+        self._is_answered = True
+        self.send(payload, is_answer=True)
+
+    def refuse(self, payload: bytes) -> None:
+        """Send the refusal of a question that cannot be read."""
+        self.answer(payload)
+
+    def drop(self) -> None:
+        """Report that there is no answer, unless one was sent."""
+        if not self._is_answered:
+            self.send(b"", is_answer=False)
+
+    @abstractmethod
+    def send(self, payload: bytes, *, is_answer: bool) -> None:
+        """Send a message to the asker."""
 
 
 def read_answer(came: Came, address: str, question: Message, reply: type[Reply], within_s: float) -> Reply:

@@ -11,15 +11,12 @@ from __future__ import annotations
 import asyncio
 import selectors
 import time
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine
 from concurrent.futures import Executor
 from contextvars import Context
-from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
+from typing import TypeVar, TypeVarTuple
 
 from backbone.errors import BackboneError
-
-if TYPE_CHECKING:
-    from _typeshed import FileDescriptorLike
 
 LONG_WAIT_S = 0.1  # chosen: the system ends a shorter wait at most half a millisecond late
 FIRST_SHARE = 0.95  # chosen: the rest is ten times as long as the system's delay
@@ -112,20 +109,17 @@ RESOLUTION_S = time.get_clock_info("monotonic").resolution
 LAST_VIRTUAL_S = 2.0**23  # 97 days; later, steps of a float are coarser than the loop's 1 ns and timers never expire
 
 
-class _JumpingSelector(selectors.BaseSelector):
+class _JumpingSelector(selectors.DefaultSelector):
     """Selects without waiting; instead of waiting it advances the loop's time."""
 
-    def __init__(self) -> None:
-        self._real = selectors.DefaultSelector()
-        self._registered = 0
-        self.now_s = 0.0
+    now_s = 0.0
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         if timeout == 0:  # callbacks are ready; sockets are looked at before time goes on
             return []
         # The loop's own socket only ends a wait in the system, and no time is spent there.
-        has_sockets = self._registered > OWN_SOCKETS
-        if (has_sockets or timeout is None) and (ready := self._real.select(0)):
+        has_sockets = len(self.get_map()) > OWN_SOCKETS
+        if (has_sockets or timeout is None) and (ready := super().select(0)):
             return ready
         if timeout is None:
             raise NothingLeftToHappen(f"all tasks wait for ever at t={self.now_s:.6f} s")
@@ -133,25 +127,6 @@ class _JumpingSelector(selectors.BaseSelector):
         if self.now_s > LAST_VIRTUAL_S:
             raise EndOfVirtualTime(f"virtual time ends at t={LAST_VIRTUAL_S:g} s")
         return []
-
-    def register(self, fileobj: FileDescriptorLike, events: int, data: object = None) -> selectors.SelectorKey:
-        key = self._real.register(fileobj, events, data)
-        self._registered += 1
-        return key
-
-    def unregister(self, fileobj: FileDescriptorLike) -> selectors.SelectorKey:
-        key = self._real.unregister(fileobj)
-        self._registered -= 1
-        return key
-
-    def modify(self, fileobj: FileDescriptorLike, events: int, data: object = None) -> selectors.SelectorKey:
-        return self._real.modify(fileobj, events, data)
-
-    def get_map(self) -> Mapping[FileDescriptorLike, selectors.SelectorKey]:
-        return self._real.get_map()
-
-    def close(self) -> None:
-        self._real.close()
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):

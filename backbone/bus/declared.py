@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from backbone.bus.inbox import InboxBus, Receiving
@@ -30,6 +31,17 @@ class Declaration:
             self._register.remove(self)
             if self._entity is not None:
                 self._entity.undeclare()
+
+
+class Withdrawal:
+    """A declaration that a function withdraws."""
+
+    def __init__(self, withdraw: Callable[[], object]) -> None:
+        self._withdraw = withdraw
+
+    def undeclare(self) -> None:
+        """Withdraw the declaration. Call it only once."""
+        self._withdraw()
 
 
 class Together:

@@ -18,7 +18,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from backbone.bus.answers import Came, NoInbox
+from backbone.bus.answers import AnsweredByMessage, Came, NoInbox
+from backbone.bus.declared import Withdrawal
 from backbone.operating_system import local_sockets
 from backbone.waiting import settle
 from backbone.wire import MAX_MESSAGE_BYTES
@@ -184,26 +185,15 @@ class HostLine:
                 self._loop.remove_writer(self._socket)
 
 
-class HostQuestion:
+class HostQuestion(AnsweredByMessage):
     """A question that came on a line, with what its answer needs."""
 
     def __init__(self, line: HostLine, number: int, payload: bytes) -> None:
         self._line, self._number, self.payload = line, number, _Whole(payload)
-        self._is_answered = False
 
-    def answer(self, payload: bytes) -> None:
-        """Send the answer."""
-        self._is_answered = True
-        self._line.send(self._number, Kind.ANSWER, payload)
-
-    def refuse(self, payload: bytes) -> None:
-        """Send the refusal of a question that cannot be read."""
-        self.answer(payload)
-
-    def drop(self) -> None:
-        """Report that there is no answer, unless one was sent."""
-        if not self._is_answered:
-            self._line.send(self._number, Kind.NO_ANSWER, b"")
+    def send(self, payload: bytes, *, is_answer: bool) -> None:
+        """Send a message on the line."""
+        self._line.send(self._number, Kind.ANSWER if is_answer else Kind.NO_ANSWER, payload)
 
 
 class _Whole(bytes):
@@ -250,10 +240,10 @@ class HostLines:
         """Number of processes that ask this one."""
         return len(self._answering)
 
-    def serve(self, inbox: str, asked: Callable[[HostQuestion], None]) -> Served:
+    def serve(self, inbox: str, asked: Callable[[HostQuestion], None]) -> Withdrawal:
         """Call a function with each question to this inbox until withdrawn."""
         self._inboxes[inbox] = asked
-        return Served(self._inboxes, inbox)
+        return Withdrawal(lambda: self._inboxes.pop(inbox, None))
 
     def way(self, name: str, inbox: str, lost: Callable[[LineWay], None]) -> LineWay | None:
         """Return the way to an inbox of the process that listens at this name; None: there is none."""
@@ -332,17 +322,6 @@ class HostLines:
             left()
         for answered in asked.waiting.values():
             settle(answered, None)
-
-
-class Served:
-    """An inbox that receives questions until it is withdrawn."""
-
-    def __init__(self, inboxes: dict[str, Callable[[HostQuestion], None]], inbox: str) -> None:
-        self._inboxes, self._inbox = inboxes, inbox
-
-    def undeclare(self) -> None:
-        """Withdraw the inbox."""
-        self._inboxes.pop(self._inbox, None)
 
 
 class LineWay:

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from functools import cache
@@ -69,15 +70,15 @@ class InboxBus(BusBase):
         self._inbox.append((act, what))
         if not (self._woken or self._has_gathering):
             self._has_gathering = True
-            try:
-                self._loop.call_soon_threadsafe(self._loop.call_later, GATHER_S, self._drain)
-            except RuntimeError:  # the loop is closed
-                log.debug("inbox dropped after the loop's end")
+            self._call_soon(self._loop.call_later, GATHER_S, self._drain)
 
     def _wake(self) -> None:
         self._woken = True
+        self._call_soon(self._drain)
+
+    def _call_soon(self, act: Callable[..., object], *arguments: object) -> None:
         try:
-            self._loop.call_soon_threadsafe(self._drain)
+            self._loop.call_soon_threadsafe(act, *arguments)
         except RuntimeError:  # the loop is closed
             log.debug("inbox dropped after the loop's end")
 
@@ -142,7 +143,36 @@ class _Waiting:
             self._bytes -= length
 
 
-class EachSample:
+class _InOrder(ABC):
+    """Receives every sample of a subscriber, in order, as long as no more than ``most_waiting_bytes`` wait.
+
+    Args:
+        push: Makes the event loop call a function with an arrival.
+    """
+
+    def __init__(self, push: Callable[[Callable[[Sample], None], Sample], None], most_waiting_bytes: int) -> None:
+        self._push, self._waiting = push, _Waiting(most_waiting_bytes)
+
+    @property
+    def dropped(self) -> int:
+        """Samples that came and were not handed over, because others waited or newer ones came."""
+        return self._waiting.dropped
+
+    def __call__(self, sample: Sample) -> None:
+        """Take a sample in; called from any thread."""
+        if self._waiting.admits(len(sample.payload)):
+            self._push(self._hand_over_one, sample)
+
+    def _hand_over_one(self, sample: Sample) -> None:
+        self._waiting.ends(len(sample.payload))
+        self.hand_over(str(sample.key_expr), sample.payload)
+
+    @abstractmethod
+    def hand_over(self, key: str, payload: Payload) -> None:
+        """Pass a message to the listener."""
+
+
+class EachSample(_InOrder):
     """Receives every sample of a subscriber, in order, as long as no more than ``MOST_WAITING_BYTES`` wait.
 
     Args:
@@ -158,22 +188,8 @@ class EachSample:
         listener: Listener,
         most_bytes: int = MAX_MESSAGE_BYTES,
     ) -> None:
+        super().__init__(bus.push, MOST_WAITING_BYTES)
         self._bus, self.of, self._reader, self._listener, self._most = bus, of, reader, listener, most_bytes
-        self._waiting = _Waiting(MOST_WAITING_BYTES)
-
-    @property
-    def dropped(self) -> int:
-        """Samples that came and were not handed over, because others waited or newer ones came."""
-        return self._waiting.dropped
-
-    def __call__(self, sample: Sample) -> None:
-        """Take a sample in; called from any thread."""
-        if self._waiting.admits(len(sample.payload)):
-            self._bus.push(self._hand_over_one, sample)
-
-    def _hand_over_one(self, sample: Sample) -> None:
-        self._waiting.ends(len(sample.payload))
-        self.hand_over(str(sample.key_expr), sample.payload)
 
     def hand_over(self, key: str, payload: Payload) -> None:
         """Read a message and call the listener."""
@@ -195,27 +211,13 @@ class EachSample:
         self._bus.on_unreadable(key, refusal)
 
 
-class OverheardSamples:
-    """Receives every sample of a subscriber, in order, as long as no more than ``most_waiting_bytes`` wait."""
+class OverheardSamples(_InOrder):
+    """Receives every sample of a subscription to whole conversations, and does not decode it."""
 
     def __init__(self, bus: InboxBus, listener: Overhearer, most_waiting_bytes: int) -> None:
+        super().__init__(bus.gather, most_waiting_bytes)
         self._bus, self._listener = bus, listener
-        self._waiting = _Waiting(most_waiting_bytes)
         self.declared: Subscription | None = None
-
-    @property
-    def dropped(self) -> int:
-        """Number of samples that came while too many waited."""
-        return self._waiting.dropped
-
-    def __call__(self, sample: Sample) -> None:
-        """Take a sample in; called from any thread."""
-        if self._waiting.admits(len(sample.payload)):
-            self._bus.gather(self._hand_over_one, sample)
-
-    def _hand_over_one(self, sample: Sample) -> None:
-        self._waiting.ends(len(sample.payload))
-        self.hand_over(str(sample.key_expr), sample.payload)
 
     def hand_over(self, key: str, payload: Payload) -> None:
         """Call the listener with the bytes of a message."""

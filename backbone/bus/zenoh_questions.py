@@ -26,7 +26,7 @@ from typing import Any, cast
 
 import zenoh
 
-from backbone.bus.answers import Came, TooLate
+from backbone.bus.answers import AnsweredByMessage, Came, TooLate
 from backbone.bus.declared import FirstReply
 from backbone.bus.host_lines import HostLines, HostQuestion, LineWay
 from backbone.bus.inbox import InboxBus
@@ -222,13 +222,12 @@ class Ways:
             self._ways.pop(address).close()
 
 
-class DirectQuestion:
+class DirectQuestion(AnsweredByMessage):
     """A question that came to an inbox, with what its answer needs."""
 
     def __init__(self, session: zenoh.Session, payload: zenoh.ZBytes, number: bytes, answers: str) -> None:
         self._session, self._number, self._answers = session, number, answers
         self.payload = payload
-        self._is_answered = False
 
     @classmethod
     def of(cls, session: zenoh.Session, mission: str, sample: zenoh.Sample) -> DirectQuestion | None:
@@ -241,20 +240,15 @@ class DirectQuestion:
             return None
         return cls(session, sample.payload, raw[: _NUMBER.size], answers)
 
-    def answer(self, payload: bytes) -> None:
-        """Publish the answer."""
-        self._is_answered = True
-        self._session.put(self._answers, payload, attachment=self._number + _ANSWERED, **_EXPRESS)
-
-    def refuse(self, payload: bytes) -> None:
-        """Publish the refusal of a question that cannot be read."""
-        self.answer(payload)
+    def send(self, payload: bytes, *, is_answer: bool) -> None:
+        """Publish a message to the inbox of the asker."""
+        attachment = self._number + (_ANSWERED if is_answer else _UNANSWERED)
+        self._session.put(self._answers, payload, attachment=attachment, **_EXPRESS)
 
     def drop(self) -> None:
         """Report that there is no answer, unless one was sent."""
-        if not self._is_answered:
-            with suppress(zenoh.ZError):  # the session is closed: the asker learns from the hub that the inbox is gone
-                self._session.put(self._answers, b"", attachment=self._number + _UNANSWERED, **_EXPRESS)
+        with suppress(zenoh.ZError):  # the session is closed: the asker learns from the hub that the inbox is gone
+            super().drop()
 
 
 class Query:

@@ -12,6 +12,8 @@ from typing import Any
 
 import zenoh
 
+from backbone.bus.declared import Withdrawal
+
 Receive = Callable[[zenoh.Sample], None]
 
 
@@ -26,7 +28,7 @@ class Subscribers:
         self._session, self._is_hub = session, is_hub
         self._fans: dict[str, _Fan] = {}
 
-    def declare(self, pattern: str, receive: Receive) -> Subscribed:
+    def declare(self, pattern: str, receive: Receive) -> Withdrawal:
         """Call the receiver with each sample of these keys until it is withdrawn."""
         fan = self._fans.get(pattern)
         if fan is None:
@@ -34,7 +36,7 @@ class Subscribers:
             each = zenoh.handlers.Callback(fan, indirect=self._is_hub)
             fan.entity = self._session.declare_subscriber(pattern, each)
         fan.receivers = (*fan.receivers, receive)
-        return Subscribed(lambda: self._withdraw(pattern, receive))
+        return Withdrawal(lambda: self._withdraw(pattern, receive))
 
     def _withdraw(self, pattern: str, receive: Receive) -> None:
         fan = self._fans[pattern]
@@ -54,14 +56,3 @@ class _Fan:
     def __call__(self, sample: zenoh.Sample) -> None:
         for receive in self.receivers:
             receive(sample)
-
-
-class Subscribed:
-    """One receiver's subscription."""
-
-    def __init__(self, withdraw: Callable[[], None]) -> None:
-        self._withdraw = withdraw
-
-    def undeclare(self) -> None:
-        """Withdraw the subscription. Call it only once."""
-        self._withdraw()
