@@ -28,23 +28,19 @@ async def set_within(event: asyncio.Event, within_s: float | None) -> bool:
         return False
 
 
-async def first_of(*waits: Awaitable[Any]) -> None:
-    """Return when one of these has ended; the others are cancelled."""
-    tasks = [asyncio.ensure_future(wait) for wait in waits]
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        await end_tasks(*tasks)
-
-
-async def first_to_end(*waits: Awaitable[Any]) -> None:
-    """Return when one of these has ended, or raise its exception; the others are cancelled."""
+async def first_of(*waits: Awaitable[Any]) -> set[asyncio.Task[Any]]:
+    """Wait until one of these has ended, and return those that have; the others are cancelled."""
     tasks = [asyncio.ensure_future(wait) for wait in waits]
     try:
         done, _others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
         await end_tasks(*tasks)
-    for task in done:
+    return done
+
+
+async def first_to_end(*waits: Awaitable[Any]) -> None:
+    """Return when one of these has ended, or raise its exception; the others are cancelled."""
+    for task in await first_of(*waits):
         task.result()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 from backbone.addresses import NAMESERVER
-from backbone.bus.interface import Bus, Clock
+from backbone.bus.interface import Bus, Clock, Reply
 from backbone.component.asking import ask_until_answered
 from backbone.component.messages import LifeState
 from backbone.creator.messages import (
@@ -29,6 +29,7 @@ from backbone.placer.decisions import PlacementRecord
 from backbone.placer.messages import CreatorSilent
 from backbone.placer.news import News
 from backbone.placer.placement_book import PlacementBook
+from backbone.wire import Message
 
 ANSWER_EACH_S, ANSWER_WITHIN_S = 1.0, 5.0  # chosen: a killed core service is back within one second
 SPAWN_WITHIN_S = START_MOST_S + 5.0  # chosen: a creator's limit and a moment; silence ends a start long before
@@ -56,15 +57,15 @@ class Creators:
         Raises:
             LinkError: The nameserver did not answer.
         """
-        return await ask_until_answered(
-            self._bus,
-            self._clock,
-            NAMESERVER,
-            ListComponents(type=CREATOR),
-            Components,
-            each_s=ANSWER_EACH_S,
-            within_s=ANSWER_WITHIN_S,
-        )
+        return await self._ask(NAMESERVER, ListComponents(type=CREATOR), Components)
+
+    async def list_processes(self, host: str) -> Processes:
+        """Return the list of the host's creator.
+
+        Raises:
+            LinkError: The creator did not answer.
+        """
+        return await self._ask(creator_of(host), ListProcesses(), Processes)
 
     async def processes_on(self, host: str) -> Processes | None:
         """Return the list of the host's creator; None if it does not answer or is gone."""
@@ -83,15 +84,8 @@ class Creators:
             CreatorSilent: The creator lives but does not answer; the outcome is unknown.
         """
         try:
-            await ask_until_answered(
-                self._bus,
-                self._clock,
-                creator_of(host),
-                ReviseSpawn(spawn.name, spawn.parameters, spawn.class_path, spawn.declared),
-                SpawnRevised,
-                each_s=ANSWER_EACH_S,
-                within_s=ANSWER_WITHIN_S,
-            )
+            revised = ReviseSpawn(spawn.name, spawn.parameters, spawn.class_path, spawn.declared)
+            await self._ask(creator_of(host), revised, SpawnRevised)
         except NotHere:  # it is on its way to this host, or was lost: the next start has the book's parameters
             return
         except LinkError as error:
@@ -162,18 +156,15 @@ class Creators:
 
     async def _is_ready(self, name: str) -> bool:
         try:
-            resolved = await ask_until_answered(
-                self._bus,
-                self._clock,
-                NAMESERVER,
-                Resolve(name),
-                Resolved,
-                each_s=ANSWER_EACH_S,
-                within_s=ANSWER_WITHIN_S,
-            )
+            resolved = await self._ask(NAMESERVER, Resolve(name), Resolved)
         except (UnknownName, LinkError):
             return False
         return resolved.component.state is LifeState.READY
+
+    async def _ask(self, address: str, question: Message, reply: type[Reply]) -> Reply:
+        return await ask_until_answered(
+            self._bus, self._clock, address, question, reply, each_s=ANSWER_EACH_S, within_s=ANSWER_WITHIN_S
+        )
 
 
 def creator_of(host: str) -> str:

@@ -7,14 +7,13 @@ from functools import partial
 
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.asking import ask_until_answered
 from backbone.component.messages import ComponentState, LifeState
-from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S, HostLoad, ListProcesses, Processes, ProcessFell
+from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S, HostLoad, ProcessFell
 from backbone.errors import LinkError
 from backbone.keys import Conversation
 from backbone.nameserver.messages import RECONNECT_S
 from backbone.naming import component_of
-from backbone.placer.creators import ANSWER_EACH_S, ANSWER_WITHIN_S, Creators, creator_of
+from backbone.placer.creators import ANSWER_WITHIN_S, Creators, creator_of
 from backbone.placer.decisions import Inspect, Instruction
 from backbone.placer.news import News
 from backbone.placer.placement_book import PlacementBook
@@ -140,15 +139,7 @@ class Meetings:
                 self._bus.subscribe(own, Conversation.STATUS, ComponentState, self._creator_status_heard),
             ]
         try:
-            answered = await ask_until_answered(
-                self._bus,
-                self._clock,
-                creator_of(host),
-                ListProcesses(),
-                Processes,
-                each_s=ANSWER_EACH_S,
-                within_s=ANSWER_WITHIN_S,
-            )
+            answered = await self._creators.list_processes(host)
         except LinkError as error:  # it may only be slow: ask again while its token exists
             self._note(host, f"its creator does not list its processes: {error}")
             self._begin_later(partial(self._meet_later, creator), f"meet {host} later")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from backbone.bus.interface import Clock
+from backbone.waiting import first_of
 
 
 class News:
@@ -21,11 +22,4 @@ class News:
 
     async def or_at(self, at_s: float) -> None:
         """Return after the next event, or at this mission time."""
-        news = asyncio.ensure_future(self._something_happened.wait())
-        time = asyncio.ensure_future(self._clock.sleep_until_s(at_s))
-        try:
-            await asyncio.wait({news, time}, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            news.cancel()
-            time.cancel()
-            await asyncio.gather(news, time, return_exceptions=True)
+        await first_of(self._something_happened.wait(), self._clock.sleep_until_s(at_s))
