@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
+from backbone.command_line.connection import REPLY_TIME_S
 from backbone.component.messages import AskParameters, Parameters, SetParameter
 from backbone.errors import LinkError, Refusal
 from backbone.launcher.messages import AskTree, Tree
@@ -25,8 +26,6 @@ from backbone.wire import plain
 
 PRIORITY, PARENT = "priority", "parent"
 RUN_TIMES = ("minimum_runtime_s", "maximum_runtime_s")
-
-REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 
 
 class WrongAttribute(Refusal):

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from backbone.command_line.joining import finite
-from backbone.command_line.recording_work import opened
+from backbone.command_line.opened_recording import opened
 from backbone.command_line.unusable_file import FileUnusable
 from backbone.errors import Refusal
 from backbone.keys import Conversation

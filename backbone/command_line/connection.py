@@ -10,6 +10,8 @@ from backbone.bus.zenoh_bus import ZenohBus
 from backbone.command_line.where import Where
 from backbone.launcher import mission_connection
 
+REPLY_TIME_S = 2.0  # chosen: a person at a terminal accepts this wait, and a slow wireless link answers within it
+
 
 def source() -> str:
     """Return the address of this process in a mission."""

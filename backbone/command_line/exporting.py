@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import ClassVar, Protocol
 
-from backbone.command_line.recording_work import opened
+from backbone.command_line.opened_recording import opened
 from backbone.command_line.unusable_file import new_folder
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.hearing import is_meant

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backbone.command_line.recording_work import opened
+from backbone.command_line.opened_recording import opened
 from backbone.command_line.unusable_file import new_file
 from backbone.foxglove.translated_copy import write_copy
 from backbone.foxglove.well_known import installed

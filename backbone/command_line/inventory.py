@@ -9,7 +9,7 @@ from rich.console import RenderableType
 
 from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
-from backbone.command_line.connection import connected
+from backbone.command_line.connection import REPLY_TIME_S, connected
 from backbone.command_line.inventory_screen import (
     ResourceUse,
     changes_table,
@@ -33,8 +33,6 @@ from backbone.printable import printable_all
 from backbone.rc_manager.messages import AskSchedule, AskUtilization
 from backbone.scheduling.requests import UnknownRc
 from backbone.scheduling.views import Schedule, Utilization
-
-REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 
 
 async def print_types(where: Where, name: str, *, as_json: bool, width: int | None) -> ExitCode:

@@ -7,12 +7,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from backbone.command_line.unusable_file import FileUnusable, new_file
+from backbone.command_line.opened_recording import opened
+from backbone.command_line.unusable_file import new_file
 from backbone.launcher.endings import ExitCode, say
-from backbone.operating_system.ending_signals import interruptible
 from backbone.recording.clock_offsets import ClockOffsets, Offset
 from backbone.recording.joining import join
-from backbone.recording.reader import NoRecording, Recording, open_file
 from backbone.spoken import counted
 
 
@@ -24,8 +23,8 @@ async def join_to(paths: Sequence[Path], to: Path) -> ExitCode:
         NoRecording: A recording is damaged, or its recorder was killed.
         OtherMission: The recordings are of different missions or starts.
     """
-    with interruptible(), ExitStack() as stack:
-        recordings = {str(path): _opened(path, stack) for path in paths}
+    with ExitStack() as stack:
+        recordings = {str(path): stack.enter_context(opened(path)) for path in paths}
         file = stack.enter_context(new_file(to))
         joined = join(recordings, file)
     copies = f"; {joined.left_out} that several recorders heard stand once" if joined.left_out else ""
@@ -33,15 +32,6 @@ async def join_to(paths: Sequence[Path], to: Path) -> ExitCode:
     for line in clock_lines(joined.clocks):
         say(f"{line}; corrected in {to.name}")
     return ExitCode.DONE
-
-
-def _opened(path: Path, stack: ExitStack) -> Recording:
-    try:
-        return Recording(stack.enter_context(open_file(path)))
-    except OSError as error:
-        raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
-    except NoRecording as error:
-        raise type(error)(f"{path}: {error.detail}", remedy=error.remedy) from error
 
 
 def clock_lines(clocks: ClockOffsets) -> Iterator[str]:

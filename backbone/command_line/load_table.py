@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
-from backbone.command_line.connection import connected
+from backbone.command_line.connection import REPLY_TIME_S, connected
 from backbone.command_line.tables import console_of_width, print_on
 from backbone.command_line.where import Where
 from backbone.component.messages import AskStatistics, Statistics
@@ -22,8 +22,6 @@ from backbone.printable import printable_all
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import plain
-
-REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 
 
 async def print_loads(where: Where, for_s: float, *, as_json: bool, width: int | None) -> ExitCode:

@@ -6,8 +6,8 @@ import json
 
 from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.interface import Bus
-from backbone.command_line.attributes import REPLY_TIME_S, attributes_of, change
-from backbone.command_line.connection import connected
+from backbone.command_line.attributes import attributes_of, change
+from backbone.command_line.connection import REPLY_TIME_S, connected
 from backbone.command_line.where import Where
 from backbone.component_database.messages import UnknownType
 from backbone.errors import LinkError, Refusal

@@ -20,10 +20,12 @@ from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
+from backbone.command_line.connection import REPLY_TIME_S
 from backbone.command_line.joining import clock_lines, clocks_json
 from backbone.command_line.message_lines import message_json, message_line
+from backbone.command_line.opened_recording import opened
 from backbone.command_line.options import DISTRIBUTION
-from backbone.command_line.unusable_file import FileUnusable, unwritable
+from backbone.command_line.unusable_file import FileUnusable, existing, unwritable
 from backbone.command_line.watching import mission_classes
 from backbone.command_line.where import Where
 from backbone.component.messages import AskTime, MissionTime, StoryEvent
@@ -45,13 +47,12 @@ from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.host_ear import HostEar
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import NoRecording, Recording, missing_numbers, open_file
+from backbone.recording.reader import Recording, missing_numbers
 from backbone.recording.recorder import Recorder
 from backbone.recording.recovering import recover_file
 from backbone.recording.revival import Reviver
 from backbone.spoken import counted
 
-REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 SHORTEST_RATED_S = 1.0  # chosen: two messages within a millisecond are no thousand a second
 VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
 
@@ -217,7 +218,7 @@ def new_files(path: Path, keep: int) -> Iterator[RecordingFiles]:
             f"the path {str(path.absolute())!r} has a byte that is no UTF-8", remedy="Name a file whose path is UTF-8."
         ) from error
     except FileExistsError as error:
-        raise FileUnusable(f"{path} exists", remedy="Name a new file.") from error
+        raise existing(path) from error
     except OSError as error:
         raise FileUnusable(f"{path} cannot be written: {error.strerror or error}") from error
     try:
@@ -233,7 +234,7 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
         with interruptible():
             done = recover_file(path, to)
     except FileExistsError as error:
-        raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
+        raise existing(to) from error
     except OSError as error:
         raise unwritable(error.filename or to, error) from error
     with opened(to) as made:
@@ -354,23 +355,3 @@ async def print_mission_file(path: Path) -> ExitCode:
 
 def _size(path: Path) -> int:
     return path.stat().st_size
-
-
-@contextmanager
-def opened(path: Path) -> Iterator[Recording]:
-    """Yield the recording in this file; Ctrl-C ends the block at once, because reading may take minutes.
-
-    Raises:
-        FileUnusable: The file cannot be read.
-        NoRecording: The file is not a recording, or its recorder was killed.
-    """
-    try:
-        file = open_file(path)
-    except OSError as error:
-        raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
-    with file, interruptible():
-        try:
-            recording = Recording(file)
-        except NoRecording as error:
-            raise type(error)(f"{path}: {error.detail}", remedy=error.remedy) from error
-        yield recording

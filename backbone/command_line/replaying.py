@@ -26,7 +26,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.command_line.comparing import print_comparison
 from backbone.command_line.message_lines import message_line
-from backbone.command_line.recording_work import opened
+from backbone.command_line.opened_recording import opened
 from backbone.component.class_path import load_class
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation

@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterable
 
 from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.interface import Bus
-from backbone.command_line.connection import connected
-from backbone.command_line.unit_modules import REPLY_TIME_S, modules_by_unit
+from backbone.command_line.connection import REPLY_TIME_S, connected
+from backbone.command_line.unit_modules import modules_by_unit
 from backbone.command_line.where import Where
 from backbone.component.messages import Absence, AskState, AskTime, ComponentState, MissionTime
 from backbone.creator.messages import creator_name

@@ -10,8 +10,8 @@ from pathlib import Path
 from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.atomic_file import replace_file
 from backbone.bus.interface import Bus
-from backbone.command_line.connection import connected
-from backbone.command_line.unusable_file import FileUnusable
+from backbone.command_line.connection import REPLY_TIME_S, connected
+from backbone.command_line.unusable_file import FileUnusable, unreadable
 from backbone.command_line.where import Where
 from backbone.component.messages import ComponentState
 from backbone.launcher.endings import ExitCode, say, show
@@ -33,7 +33,6 @@ from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 from backbone.spoken import value_text
 
-REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 CHANGED_WITHIN_S = 240.0  # chosen: longer than the longest start of a new root
 
 
@@ -156,7 +155,7 @@ def _read(file: Path) -> tuple[str, str]:
         data = sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes()
         return data.decode(), "stdin" if str(file) == "-" else str(file)
     except OSError as error:
-        raise FileUnusable(f"{file} cannot be read: {error.strerror or error}") from error
+        raise unreadable(file, error) from error
     except UnicodeDecodeError as error:
         raise FileUnusable(f"{file} is no UTF-8: byte {error.start}") from error
 

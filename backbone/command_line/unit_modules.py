@@ -7,10 +7,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from backbone.bus.interface import Bus
+from backbone.command_line.connection import REPLY_TIME_S
 from backbone.component.messages import AskParameters, Parameters
 from backbone.errors import LinkError
-
-REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
 
 
 async def modules_by_unit(bus: Bus, units: Iterable[str]) -> dict[str, list[dict[str, Any]] | None]:

@@ -35,7 +35,7 @@ def new_file(path: Path) -> Iterator[IO[bytes]]:
                 path.unlink()
                 raise
     except FileExistsError as error:
-        raise FileUnusable(f"{path} exists", remedy="Name a new file.") from error
+        raise existing(path) from error
     except OSError as error:
         raise unwritable(path, error) from error
 
@@ -58,6 +58,16 @@ def new_folder(folder: Path) -> Iterator[None]:
         raise FileUnusable(f"{folder} exists", remedy="Name a new folder.") from error
     except OSError as error:
         raise unwritable(error.filename or folder, error) from error
+
+
+def existing(path: Path) -> FileUnusable:
+    """Return the refusal of a new file that exists."""
+    return FileUnusable(f"{path} exists", remedy="Name a new file.")
+
+
+def unreadable(path: Path, error: OSError) -> FileUnusable:
+    """Return the refusal of a file that cannot be read."""
+    return FileUnusable(f"{path} cannot be read: {error.strerror or error}")
 
 
 def unwritable(path: Path | str, error: OSError) -> FileUnusable:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Overhearing
-from backbone.command_line.connection import connected
+from backbone.command_line.connection import REPLY_TIME_S, connected
 from backbone.command_line.key_facts import TrafficRow, ask_facts, with_facts
 from backbone.command_line.line_printer import LinePrinter
 from backbone.command_line.listening import until_ended
@@ -42,7 +42,6 @@ from backbone.spoken import counted
 from backbone.waiting import first_of, set_within
 from backbone.wire import Message
 
-REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 MOST_WAITING_BYTES = 16 * 1024 * 1024  # chosen: far more than a person can read
 ANSWERS_HEARD_S = 0.1  # chosen: longer than overhearing the answers to its own questions, which are not counted
 LOOK_EACH_S = 1.0  # chosen: a rate over a second is readable and recent
