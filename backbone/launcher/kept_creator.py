@@ -15,19 +15,19 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, NameTaken
 from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
-from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPolicy, creator_name
+from backbone.creator.messages import TYPE, ProcessFell, ProcessState, creator_name
 from backbone.creator.preload import preloaded_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
+from backbone.launcher.core_launches import CORE_POLICY
 from backbone.launcher.folder_watch import wait_removed
+from backbone.launcher.mission_connection import REPLY_TIME_S
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 
 READY_WITHIN_S = 20.0  # chosen: as for the creators that a launcher starts
-REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 PREDECESSOR_ENDS_S = 5.0  # chosen: a killed offer's creator ends within 3 s; seconds of the machine
 ASK_AGAIN_S = 0.2  # chosen: no person sees the difference
-POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0)
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class KeptCreator:
         self._keeper.on_fell = self.on_fell
         self._keeper.on_changed = self.on_changed
         self._keeper.use(bus)
-        await self._keeper.start(self._creator_launch(types, directory), POLICY, READY_WITHIN_S)
+        await self._keeper.start(self._creator_launch(types, directory), CORE_POLICY, READY_WITHIN_S)
 
     def processes(self) -> list[ProcessState]:
         """Return the creator's process."""

@@ -87,7 +87,7 @@ class LastBranch:
             case LastStage.WAITS:
                 self._end("skipped, as ordered" if at_once else "skipped, because the mission was not up")
             case LastStage.FREES | LastStage.RUNS:
-                self._end_after("ended by a second order", now_s)
+                self.finished("ended by a second order", now_s)
         return True
 
     def began(self, now_s: float) -> float:
@@ -102,14 +102,11 @@ class LastBranch:
         Args:
             how: As in *succeeded*, or *stopped by anna*.
         """
-        self._end_after(how, now_s)
+        self._end(f"{how} after {now_s - self._began_s:.1f} s")
 
     def not_started(self, why: str) -> None:
         """Record that the branch cannot start; if it has ended already, change nothing."""
         self._end(f"could not be started: {why}")
-
-    def _end_after(self, how: str, now_s: float) -> None:
-        self._end(f"{how} after {now_s - self._began_s:.1f} s")
 
     def _end(self, how: str) -> None:
         if self.stage is not LastStage.OVER:
