@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from backbone.component.abilities import NO_ABILITIES
-from backbone.component_database.messages import Multiplicity
 from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.mission.class_facts import ANY_ARC
 from backbone.mission.document import Element
@@ -11,7 +10,7 @@ from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.reading_checks import check_named, check_readings
 from backbone.mission.report import Report, listed
-from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
+from backbone.mission.tables import Tables, check_multiplicity, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
 from backbone.scheduling.run_times import SHORTEST_RUNTIME_S
 from backbone.spoken import counted
@@ -36,7 +35,7 @@ def check_behaviors(tables: Tables, report: Report) -> None:
                 f"Behaviors are types of subsystem mission_control: {listed(behavior_types) or 'there is none'}",
             )
         elif is_known(behavior, "type", "type of behavior", behavior_types, report):
-            _check_multiplicity(behavior, "type", tables, of_one, report)
+            check_multiplicity(behavior, "type", kind, tables, of_one, report)
         if name and name == tables.root.text("name"):
             report.fault(
                 behavior.place_of("name"),
@@ -54,24 +53,9 @@ def check_behaviors(tables: Tables, report: Report) -> None:
         _check_runtime(behavior, arc, report)
         if not is_known(arc, "kind", "kind of ARC", arc_kinds, report):
             continue
-        _check_multiplicity(arc, "kind", tables, of_one, report)
+        check_multiplicity(arc, "kind", arc.text("kind"), tables, of_one, report)
         if _wishes_fit(arc, tables, report):
             _check_set(behavior, arc, tables, sets, report)
-
-
-def _check_multiplicity(
-    element: Element, attribute: str, tables: Tables, of_one: dict[str, Element], report: Report
-) -> None:
-    kind = element.text(attribute)
-    if tables.types[kind].text("multiplicity") != Multiplicity.ONE:
-        return
-    before = of_one.setdefault(kind, element)
-    if before is not element:
-        report.fault(
-            element.place_of(attribute),
-            f"a second {kind}, of which only one may run; the first is in line {before.place.line}",
-            'Remove one, or write multiplicity="many" at the type',
-        )
 
 
 def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:

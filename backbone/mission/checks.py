@@ -36,6 +36,7 @@ from backbone.mission.tables import (
     WORLD,
     Tables,
     check_host,
+    check_multiplicity,
     check_parameters,
     check_unique,
     host_tags_lacking,
@@ -228,15 +229,7 @@ def _check_resources(tables: Tables, report: Report) -> None:
                 f"capacity {capacity:g} of {resource.text('name')}, which is not sharable",
                 'Add sharable="true", or remove the capacity',
             )
-        if kind in tables.types and tables.types[kind].text("multiplicity") == Multiplicity.ONE:
-            before = of_one.setdefault(kind, resource)
-            if before is not resource:
-                report.fault(
-                    resource.place_of("type"),
-                    f"a second resource of type {kind}, of which only one may run; the first is in line "
-                    f"{before.place.line}",
-                    'Remove one, or write multiplicity="many" at the type',
-                )
+        check_multiplicity(resource, "type", f"resource of type {kind}", tables, of_one, report)
 
 
 def _check_uses(resource: Element, tables: Tables, report: Report) -> None:

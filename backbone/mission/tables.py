@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from backbone.authentication import is_loopback
+from backbone.component_database.messages import Multiplicity
 from backbone.mission.class_facts import PLANNER, ClassFacts
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
@@ -227,6 +228,28 @@ def check_unique(elements: Iterable[Element], attribute: str, what: str, report:
                 f"a second {what} {quoted(name)}; the first is in line {before.place.line}",
                 "Give each its own name, or remove one",
             )
+
+
+def check_multiplicity(
+    element: Element, attribute: str, what: str, tables: Tables, of_one: dict[str, Element], report: Report
+) -> None:
+    """Report an element that is the second of a type of which only one may run.
+
+    Args:
+        attribute: Names the type.
+        what: The type, for people.
+        of_one: Type → its first element; the caller keeps it.
+    """
+    kind = element.text(attribute)
+    if kind not in tables.types or tables.types[kind].text("multiplicity") != Multiplicity.ONE:
+        return
+    before = of_one.setdefault(kind, element)
+    if before is not element:
+        report.fault(
+            element.place_of(attribute),
+            f"a second {what}, of which only one may run; the first is in line {before.place.line}",
+            'Remove one, or write multiplicity="many" at the type',
+        )
 
 
 def check_parameters(element: Element, reserved: Collection[str], report: Report) -> None:

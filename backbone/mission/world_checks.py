@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from backbone.mission.class_paths import CLASS_PATH, class_path_fault, class_path_remedy
+from backbone.mission.class_paths import CLASS_PATH
 from backbone.mission.document import Element
-from backbone.mission.parameter_checks import check_class_parameters
+from backbone.mission.parameter_checks import check_class_parameters, check_class_path
 from backbone.mission.report import Report, quoted
 from backbone.mission.room_files import check_room_file
 from backbone.mission.tables import (
@@ -54,9 +54,9 @@ def check_world(tables: Tables, report: Report) -> None:
             for place in body.all("point") if body.tag == "target" else [body]:
                 _check_inside(place, body, width_m, depth_m, report)
     boxes = [box for box in world.all("furniture") if box.text("shape") != "table"]
-    _check_not_in_boxes(world.all("robot"), boxes, report)
+    _check_not_inside(world.all("robot"), boxes, "width-m", "depth-m", report)
     _check_tables(world, report)
-    _check_not_in_ramps(world.all("robot"), world.all("ramp"), report)
+    _check_not_inside(world.all("robot"), world.all("ramp"), "length-m", "width-m", report)
     _check_carried(world, report)
     for target in world.all("target"):
         _check_path(target, report)
@@ -134,19 +134,6 @@ def _check_inside(place: Element, body: Element, width_m: float, depth_m: float,
         )
 
 
-def _check_not_in_boxes(robots: list[Element], boxes: list[Element], report: Report) -> None:
-    if len(robots) * len(boxes) > PAIRS_AT_MOST:
-        return
-    extents = [(box, [box.number(name) for name in ("x-m", "y-m", "width-m", "depth-m")]) for box in boxes]
-    for robot in robots:
-        x_m, y_m = robot.number("x-m"), robot.number("y-m")
-        for box, (box_x_m, box_y_m, width_m, depth_m) in extents:
-            if _is_within(x_m, box_x_m, width_m) and _is_within(y_m, box_y_m, depth_m):
-                report.fault(
-                    robot.place, f"robot {robot.text('name')} stands inside {box.text('name')}", "Move one of them"
-                )
-
-
 def _check_tables(world: Element, report: Report) -> None:
     least = {"height-m": TABLE_TOP_M, "width-m": TABLE_LEGS_M, "depth-m": TABLE_LEGS_M}
     for table in (box for box in world.all("furniture") if box.text("shape") == "table"):
@@ -160,30 +147,26 @@ def _check_tables(world: Element, report: Report) -> None:
                 )
 
 
-def _check_not_in_ramps(robots: list[Element], ramps: list[Element], report: Report) -> None:
-    if len(robots) * len(ramps) > PAIRS_AT_MOST:
+def _check_not_inside(robots: list[Element], bodies: list[Element], along: str, across: str, report: Report) -> None:
+    """Report each robot inside a body, which has these two extents and maybe a heading; skip missing numbers."""
+    if len(robots) * len(bodies) > PAIRS_AT_MOST:
         return
-    for ramp in ramps:
-        heading_rad = math.radians(ramp.number("heading-deg") or 0.0)
-        x_m, y_m = ramp.number("x-m"), ramp.number("y-m")
-        for robot in robots:
-            robot_x_m, robot_y_m = robot.number("x-m"), robot.number("y-m")
-            if x_m is None or y_m is None or robot_x_m is None or robot_y_m is None:
+    places = [(robot, robot.number("x-m"), robot.number("y-m")) for robot in robots]
+    for body in bodies:
+        x_m, y_m, length_m, width_m = (body.number(name) for name in ("x-m", "y-m", along, across))
+        if x_m is None or y_m is None or length_m is None or width_m is None:
+            continue
+        heading_rad = math.radians(body.number("heading-deg") or 0.0)
+        cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+        for robot, robot_x_m, robot_y_m in places:
+            if robot_x_m is None or robot_y_m is None:
                 continue
             east_m, north_m = robot_x_m - x_m, robot_y_m - y_m
-            along_m = east_m * math.cos(heading_rad) + north_m * math.sin(heading_rad)
-            across_m = north_m * math.cos(heading_rad) - east_m * math.sin(heading_rad)
-            if _is_within(along_m, 0.0, ramp.number("length-m")) and _is_within(across_m, 0.0, ramp.number("width-m")):
+            along_m, across_m = east_m * cosine + north_m * sine, north_m * cosine - east_m * sine
+            if abs(along_m) < length_m / 2 and abs(across_m) < width_m / 2:
                 report.fault(
-                    robot.place, f"robot {robot.text('name')} stands inside {ramp.text('name')}", "Move one of them"
+                    robot.place, f"robot {robot.text('name')} stands inside {body.text('name')}", "Move one of them"
                 )
-
-
-def _is_within(point_m: float | None, middle_m: float | None, extent_m: float | None) -> bool:
-    """Return whether a point is between the ends of an extent; False if a number is missing."""
-    if point_m is None or middle_m is None or extent_m is None:
-        return False
-    return abs(point_m - middle_m) < extent_m / 2
 
 
 def _check_path(target: Element, report: Report) -> None:
@@ -205,14 +188,8 @@ def _check_classes(world: Element, tables: Tables, report: Report) -> None:
         if not class_path:
             _check_body(robot, tables, report)
             continue
-        wrong = class_path_fault(class_path) if CLASS_PATH.fullmatch(class_path) else None
-        if wrong is not None:
-            message, there = wrong
-            report.fault(
-                robot.place_of("class"),
-                f"{class_path}: {message}{report.hint(class_path.rpartition(':')[2], there)}",
-                class_path_remedy(class_path, message),
-            )
+        if CLASS_PATH.fullmatch(class_path):
+            check_class_path(robot, "class", report)
 
 
 def _check_body(robot: Element, tables: Tables, report: Report) -> None:

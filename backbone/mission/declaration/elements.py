@@ -7,7 +7,7 @@ from pydantic import Field
 from backbone.authentication import HUB_PORT
 from backbone.component_database.messages import Multiplicity as MultiplicityWord
 from backbone.mission.declaration.module_elements import ModulesElement
-from backbone.mission.declaration.parts import Declared, ParameterElement
+from backbone.mission.declaration.parts import PROCESS, Declared, ParameterElement
 from backbone.mission.declaration.values import (
     Address,
     Capacity,
@@ -149,11 +149,7 @@ class ResourceElement(Declared):
         ),
     )
     features: Names = Field(default=(), description="Its features (camera), as names separated by blanks, for wishes.")
-    process: Name = Field(
-        default="",
-        description="Name of the process it shares with all others of that name; all are on the host that any of them "
-        "names; left out: a process of its own.",
-    )
+    process: Name = PROCESS
     uses: tuple[UsesElement, ...] = ()
     parameter: tuple[ParameterElement, ...] = ()
 
@@ -206,11 +202,7 @@ class BehaviorAttributes(Declared):
     type: Name = Field(description="Its component type, of subsystem mission_control.")
     name: Name = Field(description="Name of the behavior, unique in the mission.")
     priority: Priority = Field(description="Its priority among its siblings, a whole number; larger is higher.")
-    process: Name = Field(
-        default="",
-        description="Name of the process it shares with all others of that name; all are on the host that any of them "
-        "names; left out: a process of its own.",
-    )
+    process: Name = PROCESS
 
 
 class BehaviorElement(BehaviorAttributes):

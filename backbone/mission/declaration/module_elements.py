@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from backbone.keys import Conversation as ConversationWord
-from backbone.mission.declaration.parts import Declared, ParameterElement
+from backbone.mission.declaration.parts import PROCESS, Declared, ParameterElement
 from backbone.mission.declaration.values import (
     ClassPath,
     Conversation,
@@ -92,11 +92,7 @@ class UnitElement(Declared):
         description="Processors that its own thread may run on, as numbers separated by blanks; left out: all.",
     )
     host: Name = Field(default="", description="The host it runs on; left out: any.")
-    process: Name = Field(
-        default="",
-        description="Name of the process it shares with all others of that name; all are on the host that any of them "
-        "names; left out: a process of its own.",
-    )
+    process: Name = PROCESS
     module: tuple[ModuleElement, ...] = ()
     choose: tuple[ChooseElement, ...] = ()
 

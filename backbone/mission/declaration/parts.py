@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import BaseModel, ConfigDict, Field
 
 from backbone.mission.declaration.values import ParameterName, Text
+
+PROCESS: Any = Field(
+    default="",
+    description="Name of the process it shares with all others of that name; all are on the host that any of them "
+    "names; left out: a process of its own.",
+)
 
 
 def attribute_name(field: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from backbone.mission.declaration.parts import Declared, ParameterElement
+from backbone.mission.declaration.parts import PROCESS, Declared, ParameterElement
 from backbone.mission.declaration.values import (
     ClassPath,
     Coordinate,
@@ -200,11 +200,7 @@ class WorldElement(Declared):
     type: Name = Field(default="simulated_world", description="Its component type.")
     host: Name = Field(default="", description="The host it runs on; left out: the placer decides.")
     seed: Seed = Field(default=0, description="Seed of everything random in the world, a whole number, 0 or more.")
-    process: Name = Field(
-        default="",
-        description="Name of the process it shares with all others of that name; all are on the host that any of them "
-        "names; left out: a process of its own.",
-    )
+    process: Name = PROCESS
     parameter: tuple[ParameterElement, ...] = ()
     room: RoomElement
     air: AirElement | None = None
