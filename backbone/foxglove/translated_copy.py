@@ -13,12 +13,12 @@ from typing import IO
 from foxglove import Schema
 from mcap.records import Channel
 from mcap.records import Schema as RecordedSchema
-from mcap.writer import CompressionType, Writer
+from mcap.writer import Writer
 
 from backbone.foxglove.well_known import ENCODING, Translations, shown_as
 from backbone.recording.reader import Recording
 from backbone.recording.revival import message_as_sent
-from backbone.recording.writer import ABOUT, CHUNK_BYTES, PROFILE
+from backbone.recording.writer import begun_writer
 from backbone.wire import schema_of
 
 
@@ -35,9 +35,7 @@ def write_copy(recording: Recording, to: IO[bytes], translations: Translations, 
         NoRecording: The recording is damaged; the copy is not complete.
     """
     classes = {schema_of(kind): kind for kind in translations}
-    writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-    writer.start(profile="", library=PROFILE)
-    writer.add_metadata(ABOUT, recording.contents().about)
+    writer = begun_writer(to, recording.contents().about, profile="")
     channels, shown = _Channels(writer), 0
     for schema, channel, message, recorded in recording.records(keys):
         at_ns = message.log_time

@@ -33,11 +33,11 @@ class LinkAbsence:
         return missed_s
 
 
-def missing_in(away_s: float, of: str = "messages") -> str:
+def missing_in(away_s: float) -> str:
     """Return the sentence about an absence.
 
     Example:
         >>> missing_in(2.5)
         'the hub was away for 2.5 s; an unknown number of messages is missing'
     """
-    return f"the hub was away for {away_s:.1f} s; an unknown number of {of} is missing"
+    return f"the hub was away for {away_s:.1f} s; an unknown number of messages is missing"

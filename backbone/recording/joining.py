@@ -20,12 +20,11 @@ from operator import itemgetter
 from typing import IO, TypeVar
 
 from mcap.records import Channel, Message, Schema
-from mcap.writer import CompressionType, Writer
 
 from backbone.errors import Refusal
 from backbone.recording.clock_offsets import ClockObserver, ClockOffsets
 from backbone.recording.reader import NoRecording, Recorded, Recording
-from backbone.recording.writer import ABOUT, CHUNK_BYTES, MIME_XML, MOST_CHANNELS, NS, PROFILE
+from backbone.recording.writer import MOST_CHANNELS, NS, begun_writer
 
 SAME_BEGIN_S = 2.0  # chosen: time services move a clock by less; no mission ends and begins again so soon
 
@@ -163,14 +162,10 @@ class _JoinedWriter:
     """Writes records of several files into one, with numbers of its own for schemas and channels."""
 
     def __init__(self, to: IO[bytes], facts: dict[str, str], mission_xml: str) -> None:
-        self._writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer = begun_writer(to, facts, mission_xml)
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, int, tuple[tuple[str, str], ...]], int] = {}
         self.written = 0
-        self._writer.start(profile=PROFILE, library=PROFILE)
-        self._writer.add_metadata(ABOUT, facts)
-        if mission_xml:
-            self._writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
 
     def write(self, placed: Placed) -> None:
         log_time, schema, channel, message, _said = placed

@@ -21,8 +21,8 @@ from backbone.recording.presence import Presence
 from backbone.recording.read_ahead import ReadAhead, Ready
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.recorded_mission import RecordedMission
-from backbone.recording.revival import message_as_sent
-from backbone.wire import WIRE_VERSION, Envelope, Message
+from backbone.recording.revival import envelope_as_sent, message_as_sent
+from backbone.wire import Envelope, Message
 
 ANNOUNCED_S = 0.05  # measured: links that were idle for seconds are slow for the first 30 ms; seconds of the machine
 TAKE_GAP_S = 0.005  # measured: the first message of a class takes so long, others a tenth; seconds of the machine
@@ -165,8 +165,8 @@ class Player:
         return is_wanted and key.rpartition("/")[2] in _PUBLISHED
 
     def _publish(self, message: Recorded, said: Message) -> None:
-        envelope = Envelope(WIRE_VERSION, message.source, message.sequence, message.stamp_s, message.cause, said)
-        self._bus.pass_on(address_of(message.key), Conversation(message.key.rpartition("/")[2]), envelope)
+        conversation = Conversation(message.key.rpartition("/")[2])
+        self._bus.pass_on(address_of(message.key), conversation, envelope_as_sent(message, said))
 
     def _token_changed(self, address: str, *, is_up: bool) -> None:
         if is_up and address not in self._tokens:

@@ -23,7 +23,6 @@ from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import MAGIC_SIZE, StreamReader, breakup_chunk
 from mcap.summary import Summary
-from mcap.writer import CompressionType, Writer
 
 from backbone.recording.reader import (
     DAMAGED,
@@ -34,7 +33,7 @@ from backbone.recording.reader import (
     check_index,
     open_file,
 )
-from backbone.recording.writer import CHUNK_BYTES, PROFILE
+from backbone.recording.writer import PROFILE, begun_writer
 
 _OTHER_PROFILES = {"", "ros1", "ros2", "px4"}  # none, and the well-known ones of the MCAP specification
 _BEGIN = struct.Struct("<BQ")  # MCAP specification: the kind and the length of a record
@@ -60,8 +59,7 @@ class _WholeRecording:
     """A recording that is being written from records of another one."""
 
     def __init__(self, to: IO[bytes]) -> None:
-        self._writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._writer.start(profile=PROFILE, library=PROFILE)
+        self._writer = begun_writer(to)
         self._schemas: dict[int, int] = {0: 0}
         self._channels: dict[int, int] = {}
         self.messages = 0

@@ -30,7 +30,7 @@ from backbone.recording.known_messages import message_classes
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recorded, Recording, heard_now
 from backbone.recording.recorded_mission import NotAnswered, asked_of
-from backbone.recording.revival import message_as_sent
+from backbone.recording.revival import envelope_as_sent, message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message, Refused, schema_of, write
 
 MOST_WAITING_BYTES = 2**31
@@ -249,9 +249,9 @@ class _RecordedNetwork(LocalNetwork):
                 self._tokens[address] = bus.declare_alive(address)
         elif said is not None and conversation == Conversation.ASK:
             if is_real and address in self.servers:
-                super().carry_question(address, _sent(message, said), lambda _answer: None)
+                super().carry_question(address, envelope_as_sent(message, said), lambda _answer: None)
         elif said is not None:
-            bus.pass_on(address, Conversation(conversation), _sent(message, said))
+            bus.pass_on(address, Conversation(conversation), envelope_as_sent(message, said))
 
     def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
         """Give a question to a real component, or its recorded answer."""
@@ -284,7 +284,3 @@ class _RecordedNetwork(LocalNetwork):
 def _sent_s(message: Recorded) -> float:
     """Return the time of sending, to the last digit, if it is credible."""
     return message.stamp_s if abs(message.stamp_s - message.at_s) < NANOSECOND_S else message.at_s
-
-
-def _sent(message: Recorded, said: Message) -> Envelope[Message]:
-    return Envelope(WIRE_VERSION, message.source, message.sequence, message.stamp_s, message.cause, said)

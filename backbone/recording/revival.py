@@ -13,7 +13,7 @@ from backbone.errors import Refusal
 from backbone.naming import did_you_mean
 from backbone.recording.json_schema import TAG, fields_of
 from backbone.recording.reader import Recorded
-from backbone.wire import Message, plain, schema_of
+from backbone.wire import WIRE_VERSION, Envelope, Message, plain, schema_of
 
 WRITE_ONE = 'Write an object like {"schema": "Halt", "epoch": 3}; "watch KEY --json" shows messages with their fields.'
 Kind = TypeVar("Kind", bound=Message)
@@ -76,6 +76,11 @@ def message_as_sent(classes: Mapping[str, type[Message]], message: Recorded) -> 
         return revived(kind, message.body)
     except OtherForm:
         return None
+
+
+def envelope_as_sent(message: Recorded, said: Message) -> Envelope[Message]:
+    """Return a recorded message, restored as ``said``, in the envelope of its sender."""
+    return Envelope(WIRE_VERSION, message.source, message.sequence, message.stamp_s, message.cause, said)
 
 
 def with_names(classes: Mapping[str, type[Message]], message: Recorded) -> Recorded:

@@ -49,17 +49,13 @@ class RecordingWriter:
         keys: Sequence[str] = (),
         mission_xml: str = "",
     ) -> None:
-        self._writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer = begun_writer(file, about, mission_xml)
         self._hearing = Hearing(classes, keys)
         self._schemas: dict[type[Message], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
         self._begin_s, self._end_s, self._is_finished = -math.inf, math.inf, False
         self.written = 0
         """Number of messages so far."""
-        self._writer.start(profile=PROFILE, library=PROFILE)
-        self._writer.add_metadata(ABOUT, dict(about))
-        if mission_xml:
-            self._writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
 
     def write(self, key: str, raw: bytes, at_s: float) -> None:
         """Add bytes that arrived at a mission time, if their key is selected and they were sent in time."""
@@ -81,7 +77,7 @@ class RecordingWriter:
         if not self._begin_s <= sent_s <= self._end_s:
             return
         channel, data = self._channel_and_data(key, message)
-        sent_ns = _ns(sent_s)
+        sent_ns = max(0, round(sent_s * NS))
         self._writer.add_message(
             channel_id=channel,
             log_time=sent_ns,
@@ -130,6 +126,25 @@ class RecordingWriter:
         return known
 
 
+def begun_writer(
+    file: IO[bytes], about: Mapping[str, str] | None = None, mission_xml: str = "", profile: str = PROFILE
+) -> Writer:
+    """Return a writer of a recording that has begun.
+
+    Args:
+        about: Facts about the mission; None: they are not known yet.
+        mission_xml: The mission file; empty: not known.
+        profile: Of another kind of file, which is no recording.
+    """
+    writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer.start(profile=profile, library=PROFILE)
+    if about is not None:
+        writer.add_metadata(ABOUT, dict(about))
+    if mission_xml:
+        writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
+    return writer
+
+
 def topic_of(key: str, schema: str) -> str:
     """Return the topic of messages of a schema at a key, as other tools show it.
 
@@ -139,7 +154,3 @@ def topic_of(key: str, schema: str) -> str:
     """
     path = "/".join(key.split("/")[2:])
     return f"/{path}/{schema.partition('/')[0]}".replace("//", "/").rstrip("/")
-
-
-def _ns(at_s: float) -> int:
-    return max(0, round(at_s * NS))
