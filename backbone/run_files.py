@@ -125,9 +125,7 @@ def kept_directory() -> Path:
     sessions.
 
     Raises:
-        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
-        UnsafeDirectory: Another user could write files there.
-        RunFolderUnusable: The system refused.
+        Refusal: See ``run_directory``.
     """
     directory = _directory() / KEPT
     try:
@@ -146,9 +144,7 @@ def own_folder(mission: str) -> Iterator[Path]:
 
     Raises:
         FolderInUse: Another process has the folder.
-        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
-        UnsafeDirectory: Another user could write files there.
-        RunFolderUnusable: The system refused; the folder is removed.
+        Refusal: See ``run_directory``. If the system refuses, the folder is removed.
     """
     descriptor = _locked_folder(mission)
     try:
@@ -163,9 +159,7 @@ def prepare(mission: str) -> Path:
     """Create the folder of a mission's files, check that it is writable, and return it.
 
     Raises:
-        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
-        UnsafeDirectory: Another user could write files there.
-        RunFolderUnusable: The system refused; the folder is removed.
+        Refusal: See ``run_directory``. If the system refuses, the folder is removed.
     """
     directory = run_directory(mission)
     _remove_what_dead_zygotes_left(directory)
@@ -202,9 +196,7 @@ def write(run_file: RunFile) -> Path:
     """Make the mission findable and return the file's path.
 
     Raises:
-        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
-        UnsafeDirectory: Another user could write files there.
-        RunFolderUnusable: The system refused.
+        Refusal: See ``run_directory``.
     """
     directory = run_directory(run_file.mission)
     began_s = started_s(run_file.launcher_pid) or 0.0
@@ -257,9 +249,7 @@ def find_all() -> list[RunFile]:
     """Return the missions that are up on this machine, sorted by name; folders that cannot be read are left out.
 
     Raises:
-        RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
-        UnsafeDirectory: Another user could write files there.
-        RunFolderUnusable: The system refused to list the folders.
+        Refusal: See ``run_directory``.
     """
     directory = _directory()
     try:

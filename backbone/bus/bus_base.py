@@ -93,7 +93,7 @@ class BusBase(ABC):
         """Run a coroutine as a task that this bus owns until the bus is closed."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks[task] = None
-        task.add_done_callback(self._forget)
+        task.add_done_callback(lambda ended: self._tasks.pop(ended, None))
         return task
 
     async def reply_to(self, question: Envelope[Message], answer: Answer) -> Envelope[Message] | None:
@@ -213,9 +213,6 @@ class BusBase(ABC):
     @abstractmethod
     async def leave(self) -> None:
         """Leave the network. Called when no declaration is left and no task of this bus runs."""
-
-    def _forget(self, task: asyncio.Task[object]) -> None:
-        self._tasks.pop(task, None)
 
     async def _finish(self, answering: list[asyncio.Task[object]]) -> None:
         await asyncio.gather(*answering, return_exceptions=True)

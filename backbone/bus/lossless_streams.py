@@ -202,7 +202,8 @@ class LosslessSamples:
             self._bus.unreadable += 1
             return
         stream, number, lost, length = _HEAD.unpack_from(attached)
-        inbox, key = (part.decode(errors="replace") for part in _split(attached[_HEAD.size :], length))
+        names = attached[_HEAD.size :]
+        inbox, key = (name.decode(errors="replace") for name in (names[:length], names[length:]))
         if not (is_inbox(inbox, self._mission, _KIND) and matches(self.of, key)):
             self._bus.unreadable += 1
             return
@@ -226,10 +227,6 @@ class LosslessOverhearing:
     def close(self) -> None:
         """Withdraw the subscription."""
         self._declared.close()
-
-
-def _split(raw: bytes, length: int) -> tuple[bytes, bytes]:
-    return raw[:length], raw[length:]
 
 
 def session_id(session: zenoh.Session) -> str:

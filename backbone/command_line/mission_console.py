@@ -183,10 +183,9 @@ class ConsoleObserver:
                 await clock.sleep_s(SWITCH_S * clock.rate)
         finally:
             with contextlib.suppress(RuntimeError):  # the bus is closed already
-                bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard_schedule, latest=True)
-
-    def _heard_schedule(self, envelope: Envelope[Schedule]) -> None:
-        self._tell_changed(envelope.body)
+                bus.subscribe(
+                    RC_MANAGER, Conversation.SCHEDULE, Schedule, lambda said: self._tell_changed(said.body), latest=True
+                )
 
     def _tell_changed(self, schedule: Schedule) -> None:
         if any(request.state in (RequestState.CONNECTING, RequestState.REVOKING) for request in schedule.requests):

@@ -96,14 +96,14 @@ def metrics(numbers: Numbers) -> Metrics:
 
 
 def _counter(name: str, what: str, labels: list[str], values: Values) -> Metric:
-    family = CounterMetricFamily(f"scout_{name}", what, labels=labels)
-    for labelled, value in values:
-        family.add_metric(labelled, value)
-    return family
+    return _filled(CounterMetricFamily(f"scout_{name}", what, labels=labels), values)
 
 
 def _gauge(name: str, what: str, labels: list[str], values: Values) -> Metric:
-    family = GaugeMetricFamily(f"scout_{name}", what, labels=labels)
+    return _filled(GaugeMetricFamily(f"scout_{name}", what, labels=labels), values)
+
+
+def _filled(family: CounterMetricFamily | GaugeMetricFamily, values: Values) -> Metric:
     for labelled, value in values:
         family.add_metric(labelled, value)
     return family
