@@ -172,6 +172,7 @@ class CommonAnswers:
             f"if it is started again, {name} is {again}"
         )
 
+
 def is_measure(name: object, value: object) -> bool:
     """Return whether a message can hold this statistic.
 
