@@ -6,36 +6,94 @@ Rule of this file: nothing changes. Source: decision 0011.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from backbone.scheduling.entries import INSTANT_S, ArcEntry
+from backbone.scheduling.entries import INSTANT_S, SOON_S, ArcEntry
 from backbone.scheduling.table import Table
 
 LOOK_AHEAD = 3  # chosen: length of a chain of first ARCs that wait for each other; beyond it only holders count
+MOST_LOOKS = 64  # chosen: a reservation that so many looks did not need is computed anew
+MOST_KEPT = 8  # chosen: for each ARC; a large group has fewer than two reservations for each, without those that left
 
 
 _Line = list[tuple[ArcEntry, bool]]
 """The other ARCs that are first in line at the RCs of an ARC and leave it no room; whether each is higher."""
 
 
-@dataclass(slots=True, frozen=True)
+@dataclass(slots=True)
 class _Around:
-    """What surrounds an ARC at its RCs.
+    """What surrounds an ARC at its RCs; every change of it is a change of one of these RCs.
 
     Attributes:
         version: Sum of the versions of its RCs, and of their service, at that time.
-        holders: The other ARCs that hold its RCs and leave it no room.
+        looked: Version of the state at the last comparison of ``version``.
+        end_s: Latest end of the slices of its holders: the other ARCs that hold its RCs and leave it no room.
+        soon_s: Shortest time until these are gone: not 0 while one settles or is being revoked.
+        ahead: The RCs at which it is first, as a set of bits.
         line: Its line.
     """
 
     version: int
-    holders: list[ArcEntry]
+    looked: int
+    end_s: float
+    soon_s: float
+    ahead: int
     line: _Line
 
 
+_Place = tuple[ArcEntry, int]
+"""An ARC, and the length of the chain of first ARCs that count before it."""
+
+
+class _Chain(NamedTuple):
+    """ARCs of which each waits for the next; they do not wait for themselves, although equality is not transitive.
+
+    Attributes:
+        arcs: The ARCs, the candidate first.
+        ahead: The RCs at which one of them is first, as a set of bits.
+    """
+
+    arcs: tuple[ArcEntry, ...]
+    ahead: int
+
+
+@dataclass(slots=True)
+class _Reserved:
+    """When the RCs are reserved for an ARC.
+
+    Attributes:
+        start_s: Begin of the reservation.
+        rcs: The RCs on which it depends, as a set of bits.
+        until_s: Last time at which it stands, while none of these RCs changes.
+        looked: Number of the look at the state that found it standing last.
+    """
+
+    start_s: float
+    rcs: int
+    until_s: float
+    looked: int
+
+
+class _Delayed(NamedTuple):
+    """Why an ARC cannot start yet.
+
+    Attributes:
+        version: Sum of the versions of its RCs, and of their service, at that time.
+        reserved: The reservation that a start would delay.
+    """
+
+    version: int
+    reserved: _Reserved
+
+
 class FirstInLine:
-    """The reservations of the first ARCs at the RCs."""
+    """The reservations of the first ARCs at the RCs.
+
+    What it keeps changes no answer, so a snapshot contains only ``_firsts``: under the discipline ``time`` the order at
+    an RC is that of the first question after the RC's last change.
+    """
 
     def __init__(self, table: Table, *, slack_s: float) -> None:
         """Begin with no known first ARC.
@@ -46,13 +104,16 @@ class FirstInLine:
         self._table = table
         self._state = table.state
         self._slack_s = slack_s
-        self._looked = -1
-        """Version of the state for which the next is known."""
-        self._present: dict[ArcEntry, tuple[float, _Line]] = {}
-        """ARC → end of its holders' slices, and its line."""
-        self._reserved: dict[ArcEntry, float] = {}
+        self._by_time = table.state.fairness.discipline == "time"
+        self._looked, self._looked_s = 0, -math.inf
+        """Number of looks at the state, and the time of the last one."""
+        self._changes: list[int] = []
+        """The RCs that changed before each of the last looks, as sets of bits."""
+        self._service_version = -1
+        self._reserved: dict[_Place, _Reserved] = {}
         self._firsts: dict[str, tuple[int, ArcEntry | None]] = {}
         self._around: dict[ArcEntry, _Around] = {}
+        self._delayed: dict[ArcEntry, _Delayed] = {}
 
     def at(self, rc: str) -> ArcEntry | None:
         """Return the first ARC in the order of the RC's queue; None if it is empty."""
@@ -71,14 +132,48 @@ class FirstInLine:
             holders: The other ARCs that hold an RC of it.
             now_s: Time of its start.
         """
-        if self._looked != self._state.version:
-            self._looked = self._state.version
-            self._present.clear()
-        self._reserved.clear()  # its reservations were computed for another candidate
+        self._look(now_s)
+        if self._still_delays(arc):
+            return True
         at = {rc: self.at(rc) for rc in arc.uses}
+        chain = _Chain((arc,), self._ahead(arc, at))
+        found = self._delayed_by(chain, at, holders, now_s)
+        if found is not None and not found.rcs & chain.ahead:
+            self._delayed[arc] = _Delayed(self._version_at(arc), found)
+        return found is not None
+
+    def _look(self, now_s: float) -> None:
+        """Take note of the time and of all changes since the last look; reservations that they concern are outdated."""
+        state = self._state
+        for kept in (self._reserved, self._around, self._delayed):
+            if len(kept) > MOST_KEPT * len(state.arcs):
+                kept.clear()  # they may hold ARCs that left
+        changed, state.concerned = state.concerned, 0
+        if not changed and now_s == self._looked_s:
+            return
+        self._looked += 1
+        self._looked_s = now_s
+        self._changes = [*self._changes[-MOST_LOOKS:], changed]
+        if self._by_time or self._service_version != state.service_version:
+            self._service_version = state.service_version
+            self._reserved.clear()
+            self._delayed.clear()
+
+    def _still_delays(self, arc: ArcEntry) -> bool:
+        """Return whether the earlier answer stands: what a start would delay has only come nearer. False: unknown."""
+        known = self._delayed.get(arc)
+        return known is not None and known.version == self._version_at(arc) and self._stands(known.reserved)
+
+    def _delayed_by(
+        self, chain: _Chain, at: Mapping[str, ArcEntry | None], holders: Sequence[ArcEntry], now_s: float
+    ) -> _Reserved | None:
+        """Return the first reservation found that a start of the candidate now would delay; None if there is none."""
+        (arc,) = chain.arcs
         firsts = dict.fromkeys(first for first in at.values() if first is not None)
-        if arc not in firsts and self._takes_from(firsts, arc, holders, now_s):
-            return True  # most candidates end here
+        if arc not in firsts:
+            delayed = self._first_delayed(firsts, chain, holders, now_s)
+            if delayed is not None:
+                return delayed
         users = dict.fromkeys(user for rc in arc.uses for user in self._state.users[rc] if user.queued)
         higher_ones = [one for one in users if one.level is not arc.level and one.goes_before(arc)]
         others = [one for one in higher_ones if one not in firsts]
@@ -86,22 +181,27 @@ class FirstInLine:
             # Equality is not transitive: two ARCs can each be first at a common RC. The lower one then waits.
             higher_waits = any(map(self._table.usable, higher_ones))
             ahead = set() if higher_waits else {rc for rc, first in at.items() if first is arc}
-            if self._takes_from([first for first in firsts if ahead.isdisjoint(first.uses)], arc, holders, now_s):
-                return True
+            delayed = self._first_delayed([one for one in firsts if ahead.isdisjoint(one.uses)], chain, holders, now_s)
+            if delayed is not None:
+                return delayed
         else:
             # An ARC for which RCs are being freed is not the first in line behind a higher one.
             others += [one for one in users if self._is_being_freed_for(one, arc)]
-        return self._takes_from(others, arc, holders, now_s)
+        return self._first_delayed(others, chain, holders, now_s)
 
-    def _takes_from(self, others: Iterable[ArcEntry], arc: ArcEntry, holders: Sequence[ArcEntry], now_s: float) -> bool:
-        """Return whether the run of the ARC, beside those holders that leave it room, would delay one of the others."""
+    def _first_delayed(
+        self, others: Iterable[ArcEntry], chain: _Chain, holders: Sequence[ArcEntry], now_s: float
+    ) -> _Reserved | None:
+        """Return the first of the others' reservations that the candidate, beside holders with room for it, delays."""
+        (arc,) = chain.arcs
         fits, end_s, shared = self._table.fits, self._must_be_done_s(arc, now_s), arc.touches & ~arc.excludes
         crowd = [holder for holder in holders if holder.touches & shared and fits(arc, [holder])]
-        return any(
-            self._reserved_s(other, now_s, (arc,)) < end_s
-            for other in others
-            if other is not arc and not fits(arc, [other, *crowd]) and self._table.usable(other)
-        )
+        for other in others:
+            if other is not arc and not fits(arc, [other, *crowd]) and self._table.usable(other):
+                reserved = self._reserved_at((other, LOOK_AHEAD), chain, now_s)
+                if reserved.start_s < end_s:
+                    return reserved
+        return None
 
     def _is_being_freed_for(self, other: ArcEntry, arc: ArcEntry) -> bool:
         """Return whether RCs are being freed for the other ARC, since before any for this one, which is not higher."""
@@ -112,49 +212,77 @@ class FirstInLine:
         """Return when others may need the RCs of an ARC that starts then; hand-overs may use up the slack."""
         return start_s + arc.length_s - min(self._slack_s, arc.minimum_s / 2) - INSTANT_S
 
-    def _reserved_s(self, arc: ArcEntry, now_s: float, behind: tuple[ArcEntry, ...]) -> float:
-        """Return when the RCs are reserved for the ARC: after its holders' slices and the runs of other first ARCs.
+    def _stands(self, known: _Reserved) -> bool:
+        """Return whether a reservation is still true; False also if it is too old to tell."""
+        looks = self._looked - known.looked
+        if not looks:
+            return True
+        if looks > MOST_LOOKS or self._looked_s > known.until_s:
+            return False
+        rcs = known.rcs
+        for changed in self._changes[-looks:]:
+            if rcs & changed:
+                return False
+        known.looked = self._looked
+        return True
+
+    def _reserved_at(self, place: _Place, behind: _Chain, now_s: float) -> _Reserved:
+        """Return when the RCs are reserved for an ARC: after its holders' slices and the runs of other first ARCs.
 
         Args:
+            behind: The ARCs that wait for it; they do not count.
             now_s: Earliest time.
-            behind: ARCs on the chain so far. They do not wait for themselves, although equality is not transitive.
         """
-        known_s = self._reserved.get(arc)
-        if known_s is not None:
-            return known_s
-        start_s, line = self._present.get(arc) or self._look_at(arc, now_s)
-        if len(behind) > LOOK_AHEAD or start_s == math.inf:
-            return start_s
+        known = self._reserved.get(place)
+        if known is not None and not known.rcs & behind.ahead and self._stands(known):
+            return known
+        arc, links = place
+        around, rcs = self._around_of(arc), arc.touches
+        start_s = max(now_s + around.soon_s, around.end_s)
+        until_s = max(now_s, around.end_s - around.soon_s)
+        line = around.line if links and start_s < math.inf else ()
+        chain = _Chain((*behind.arcs, arc), behind.ahead | around.ahead)
         for first, is_higher in line:
-            if first in behind:
+            if first in behind.arcs:
                 continue
-            first_s = self._reserved_s(first, now_s, (*behind, arc))
-            if first_s < self._must_be_done_s(arc, start_s):
-                start_s = math.inf if is_higher else max(start_s, first_s + first.length_s)
-        self._reserved[arc] = start_s
-        return start_s
-
-    def _look_at(self, arc: ArcEntry, now_s: float) -> tuple[float, _Line]:
-        around, until_s = self._around_of(arc), self._table.stands_until_s
-        found = max([now_s, *[until_s(holder, arc, now_s) for holder in around.holders]]), around.line
-        self._present[arc] = found
+            before = self._reserved_at((first, links - 1), chain, now_s)
+            rcs |= before.rcs
+            until_s = min(until_s, before.until_s)
+            if before.start_s < self._must_be_done_s(arc, start_s):
+                start_s = math.inf if is_higher else max(start_s, before.start_s + first.length_s)
+        found = _Reserved(start_s, rcs, until_s, self._looked)
+        if not rcs & behind.ahead:  # else it depends on who waits for it
+            self._reserved[place] = found
         return found
+
+    def _ahead(self, arc: ArcEntry, at: Mapping[str, ArcEntry | None]) -> int:
+        """Return the RCs at which the ARC is first, as a set of bits."""
+        return sum(self._state.bits[rc] for rc, first in at.items() if first is arc)
+
+    def _version_at(self, arc: ArcEntry) -> int:
+        """Return a number that grows with every change that concerns an RC of the ARC."""
+        versions = self._state.rc_versions
+        return self._state.service_version + sum([versions.get(rc, 0) for rc in arc.uses])
 
     def _around_of(self, arc: ArcEntry) -> _Around:
         """Return the neighbors of the ARC at its RCs; they are collected again after a change of one of these RCs."""
-        versions = self._state.rc_versions
-        version = self._state.service_version + sum([versions.get(rc, 0) for rc in arc.uses])
-        known = self._around.get(arc)
+        state, known = self._state, self._around.get(arc)
+        if known is not None and known.looked == state.version:
+            return known
+        version = self._version_at(arc)
         if known is None or known.version != version:
-            if len(self._around) > 2 * len(self._state.arcs):
-                self._around.clear()  # it may hold ARCs that left
             known = self._around[arc] = self._collected(arc, version)
+        known.looked = state.version
         return known
 
     def _collected(self, arc: ArcEntry, version: int) -> _Around:
         table = self._table
         holders = [holder for holder in table.holders(arc) if not table.fits(arc, [holder])]
-        firsts = [first for first in map(self.at, arc.uses) if first is not None and first is not arc]
+        at = {rc: self.at(rc) for rc in arc.uses}
+        firsts = [first for first in at.values() if first is not None and first is not arc]
         line = [(first, first.goes_before(arc)) for first in firsts if not table.fits(arc, [first])]
         # RCs freed for it by force are its own; only a higher ARC may need them first.
-        return _Around(version, holders, [one for one in line if arc.reservation is None or one[1]])
+        line = [one for one in line if arc.reservation is None or one[1]]
+        end_s = max([table.stands_until_s(holder, arc, -math.inf) for holder in holders], default=-math.inf)
+        soon_s = SOON_S if any(table.stands_beyond_now(holder, arc) for holder in holders) else 0.0
+        return _Around(version, self._state.version, end_s, soon_s, self._ahead(arc, at), line)

@@ -84,13 +84,17 @@ class LargeGroupPlanner:
         These are the users of an RC, and ARCs that may wait for one of its users at another RC.
         """
         users, held_alone = self._state.users, self._state.held_alone
+        elsewhere: dict[str, None] = {}
         for rc in self._near:
-            near = dict.fromkeys(users.get(rc, ()))
-            queued = [arc for arc in near if arc.queued]
-            elsewhere = {other: None for arc in queued for other in arc.uses if self._may_hold_up(arc, other)}
-            for other in elsewhere:
-                near.update((user, None) for user in users.get(other, ()) if not user.touches & held_alone)
-            self._candidates.update((arc, None) for arc in near if arc.state is RequestState.WAITING)
+            for arc in users.get(rc, ()):
+                if arc.state is RequestState.WAITING:
+                    self._candidates[arc] = None
+                if arc.queued and arc.touches & ~held_alone:
+                    elsewhere.update((other, None) for other in arc.uses if self._may_hold_up(arc, other))
+        for rc in elsewhere:
+            for arc in users[rc]:
+                if arc.state is RequestState.WAITING and not arc.touches & held_alone:
+                    self._candidates[arc] = None
         self._near.clear()
 
     def _may_hold_up(self, arc: ArcEntry, rc: str) -> bool:

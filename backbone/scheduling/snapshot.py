@@ -44,7 +44,7 @@ from backbone.scheduling.trace_writer import TraceWriter
 from backbone.scheduling.transitions import Transitions
 from backbone.scheduling.whole_group import WholeGroupPlanner
 
-FORM = 5
+FORM = 6
 """Grows when snapshots of an earlier release can no longer be read."""
 _OBJECTS: dict[str, type[Any]] = {
     kind.__name__: kind
@@ -87,7 +87,7 @@ _ENUMS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (requests.Reque
 _CACHES = {
     "WholeGroupPlanner": {"_plans"},
     "Compatibility": {"_usable", "_admitted"},
-    "FirstInLine": {"_present", "_reserved", "_around"},
+    "FirstInLine": {"_changes", "_reserved", "_around", "_delayed"},
     "Level": {"ranks"},
     "TraceWriter": {"_story"},
     "OpenDecision": {"instructions", "ended"},

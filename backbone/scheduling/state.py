@@ -36,6 +36,7 @@ class ScheduleState:
         service_version: Grows with every change of the RCs' service or of priorities.
         rc_versions: RC → a number that grows with every other change that concerns the RC.
         changed: RCs that changes concerned since the last examination by the planners, in the order of the changes.
+        concerned: The RCs that changes concerned since the last examination of the reservations, as a set of bits.
         bits: RC → its bit in sets of RCs.
         held_alone: RCs held exclusively by an ARC whose slice is not over, as a set of bits.
     """
@@ -63,6 +64,7 @@ class ScheduleState:
         self.service_version = 0
         self.rc_versions: dict[str, int] = {}
         self.changed: dict[str, None] = {}
+        self.concerned = 0
         self.bits: dict[str, int] = {}
         self._epochs_of_removed: dict[str, int] = {}
         self._levels: dict[tuple[Path, int], Level] = {}
@@ -74,6 +76,7 @@ class ScheduleState:
         """Record that a change concerns these RCs."""
         for rc in rcs:
             self.changed[rc] = None
+            self.concerned |= self.bits.get(rc, 0)
             self.rc_versions[rc] = self.rc_versions.get(rc, 0) + 1
         self.version += 1
 

@@ -86,6 +86,12 @@ class Table:
             return max(now_s + SOON_S, holder.began_s + holder.length_s)
         return max(now_s, holder.end_s)
 
+    def stands_beyond_now(self, holder: ArcEntry, arc: ArcEntry) -> bool:
+        """Return whether the holder blocks the ARC beyond the present time, even if it should be gone by now."""
+        if holder.state is RequestState.CONNECTING:
+            return not arc.goes_before(holder)
+        return holder.state is RequestState.REVOKING
+
     def is_overdue(self, arc: ArcEntry, now_s: float) -> bool:
         """Return whether the RCs of the ARC should have been free by now."""
         return arc.state is RequestState.REVOKING and now_s > arc.since_s + arc.release_s

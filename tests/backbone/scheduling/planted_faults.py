@@ -208,13 +208,13 @@ FAULTS = [
     Planted(
         "the first in line of a large group is overtaken",
         "first_in_line.py",
-        "if arc not in firsts and self._takes_from(",
-        "if False and self._takes_from(",
+        "        if arc not in firsts:\n",
+        "        if False:\n",
     ),
     Planted(
         "two equals of a large group, each first where both want to be, wait for each other",
         "first_in_line.py",
-        "ahead.isdisjoint(first.uses)",
+        "ahead.isdisjoint(one.uses)",
         "True",
     ),
     Planted(
@@ -222,6 +222,24 @@ FAULTS = [
         "first_in_line.py",
         "if arc.reservation is None or one[1]]",
         "if arc.reservation is None]",
+    ),
+    Planted(
+        "a reservation in a large group is kept although an RC on which it depends has changed",
+        "first_in_line.py",
+        "if rcs & changed:",
+        "if False:",
+    ),
+    Planted(
+        "a reservation in a large group is kept after the time from which it would be later",
+        "first_in_line.py",
+        "self._looked_s > known.until_s",
+        "False",
+    ),
+    Planted(
+        "a reservation that depends on who waits is kept for all",
+        "first_in_line.py",
+        "if not rcs & behind.ahead:",
+        "if True:",
     ),
     Planted(
         "a slice ends although it is awaited by none",

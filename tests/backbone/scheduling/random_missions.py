@@ -56,22 +56,34 @@ def random_mission(
 
 def crowded_mission(rng: Random, **rules: Any) -> tuple[Bench, list[tuple[float, Event]]]:
     """Return a bench as ``random_mission``, with 8 to 24 ARCs and up to 14 RCs."""
-    rcs = [_rc(rng, number) for number in range(rng.randint(3, 14))]
+    return _crowd(rng, rcs=(3, 14), arcs=(8, 24), whims=[0, 2, 6, 12], rules=rules)
+
+
+def fleet_mission(rng: Random, **rules: Any) -> tuple[Bench, list[tuple[float, Event]]]:
+    """Return a bench as ``random_mission``, with 100 to 250 ARCs and up to 80 RCs."""
+    return _crowd(rng, rcs=(30, 80), arcs=(100, 250), whims=[0, 20], rules=rules)
+
+
+def _crowd(
+    rng: Random, *, rcs: tuple[int, int], arcs: tuple[int, int], whims: list[int], rules: dict[str, Any]
+) -> tuple[Bench, list[tuple[float, Event]]]:
+    """Return a bench with some number of RCs, and what that number of ARCs does on it."""
+    present = [_rc(rng, number) for number in range(rng.randint(*rcs))]
     grace_s = rng.choice([0.0, 0.0, 0.2])
     bench = Bench(
         manager(grace_s=grace_s, **rules),
-        *rcs,
+        *present,
         pause_s=lambda deadline_s: rng.choice([0.0, deadline_s / 2, deadline_s]),
     )
     level = rng.choice([1, 2, 3])
     tree = {f"p{number}": rng.randint(1, level) for number in range(rng.randint(1, 5))}
-    asked = [_request(rng, number, rcs, tree, level) for number in range(rng.randint(8, 24))]
+    asked = [_request(rng, number, present, tree, level) for number in range(rng.randint(*arcs))]
     requests = [request for request in asked if _can_ever_run(bench, request)]
     if not requests:
         return bench, []
-    happens = _happens(rng, requests, [0, 2, 6, 12])
+    happens = _happens(rng, requests, whims)
     for _ in range(rng.choice([0, 0, 1, 2])):
-        happens += _fault(rng, rng.choice(rcs))
+        happens += _fault(rng, rng.choice(present))
     return bench, sorted(happens, key=lambda item: item[0])
 
 

@@ -1,0 +1,68 @@
+"""Large groups: what the planner keeps from one decision to the next never changes a decision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import pytest
+from examples import share
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from random_missions import crowded_mission, fleet_mission, play
+from simulated_switches import Bench
+
+from backbone.scheduling import large_group
+from backbone.scheduling.entries import ArcEntry
+from backbone.scheduling.first_in_line import FirstInLine
+
+RULES: list[dict[str, Any]] = [{}, {"policy": "strict"}, {"discipline": "time"}, {"aging_s": 3.0}, {"grid_s": 2.0}]
+FLEET_S = 20.0
+
+
+class Forgetful(FirstInLine):
+    """Keeps nothing from one look to the next."""
+
+    def _look(self, now_s: float) -> None:
+        for kept in (self._around, self._reserved, self._delayed):
+            kept.clear()
+        if self._state.fairness.discipline != "time":  # there a snapshot contains the first ARCs
+            self._firsts.clear()
+        super()._look(now_s)
+
+
+def crowd(seed: int, rules: dict[str, Any]) -> Bench:
+    return play(*crowded_mission(Random(seed), exact_up_to=0, **rules))
+
+
+def fleet(seed: int, rules: dict[str, Any]) -> Bench:
+    return play(*fleet_mission(Random(seed), exact_up_to=0, **rules), until_s=FLEET_S)
+
+
+@settings(max_examples=share(60))
+@given(played=st.sampled_from([crowd, fleet]), seed=st.integers(0, 2**32), rules=st.sampled_from(RULES))
+@example(played=crowd, seed=167, rules={})  # differs if a reservation depends on earlier questions
+@example(played=crowd, seed=294, rules={})
+@example(played=crowd, seed=11, rules={"policy": "strict"})  # differs if a reservation stands after its time
+def test_a_planner_that_keeps_nothing_decides_the_same(
+    played: Callable[[int, dict[str, Any]], Bench], seed: int, rules: dict[str, Any]
+) -> None:
+    expected = played(seed, rules).trace
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(large_group, "FirstInLine", Forgetful)
+        assert played(seed, rules).trace == expected
+
+
+def test_answers_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers: list[bool] = []
+
+    class Counting(FirstInLine):
+        def _still_delays(self, arc: ArcEntry) -> bool:
+            answers.append(super()._still_delays(arc))
+            return answers[-1]
+
+    monkeypatch.setattr(large_group, "FirstInLine", Counting)
+    for seed in range(5):
+        fleet(seed, {})
+    assert answers.count(True) > 100
