@@ -27,6 +27,7 @@ from backbone.keys import Conversation
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved
 from backbone.naming import Subsystem
 from backbone.wire import Envelope, UnknownMessage
+from ui_console.model.message_views import PixelPicture
 
 log = logging.getLogger(__name__)
 
@@ -130,7 +131,11 @@ async def keep_looking(
         hearing.close()
 
 
-def pixels_of(picture: ViewPicture) -> NDArray[np.uint8]:
-    """Return grey levels of shape (height, width), or red, green and blue of shape (height, width, 3)."""
+def pixels_of(picture: ViewPicture | PixelPicture) -> NDArray[np.uint8]:
+    """Return grey levels of shape (height, width), or red, green and blue of shape (height, width, 3).
+
+    Raises:
+        ValueError: There are too few or too many pixels.
+    """
     shape = (picture.height_px, picture.width_px, 3) if picture.is_color else (picture.height_px, picture.width_px)
     return np.frombuffer(picture.pixels, np.uint8).reshape(shape)

@@ -21,6 +21,7 @@ from backbone.spoken import counted
 from ui_console.model.key_table import KeyRow, with_words
 from ui_console.model.key_view import KeyView
 from ui_console.model.message_views import PixelPicture
+from ui_console.session.looking import pixels_of
 from ui_console.terminal.dialogs import Dialog, Field, field_remark
 from ui_console.terminal.widgets import Video
 
@@ -250,18 +251,13 @@ class KeyDialog(Dialog[None]):
         """Return the newest picture, the same array for the same picture."""
         picture = self._view.picture if self._view is not None else None
         if picture is not self._drawn[0]:
-            self._drawn = picture, _pixels_of(picture) if picture is not None else None
+            self._drawn = picture, pixels_of(picture) if picture is not None else None
         return self._drawn[1]
 
 
 def _sender(row: KeyRow) -> str:
     """Return the sender, unless it is the component of the key."""
     return "" if row.key.startswith(f"{row.source}/") else row.source
-
-
-def _pixels_of(picture: PixelPicture) -> NDArray[np.uint8]:
-    shape = (picture.height_px, picture.width_px, 3) if picture.is_color else (picture.height_px, picture.width_px)
-    return np.frombuffer(picture.pixels, np.uint8).reshape(shape)
 
 
 def _return_to(table: DataTable[Text], row: RowKey | None) -> None:

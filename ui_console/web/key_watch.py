@@ -26,8 +26,9 @@ from ui_console.model.key_shown import MessageShown, key_list
 from ui_console.model.key_table import KeyRow
 from ui_console.model.key_view import KeyView
 from ui_console.model.message_views import installed_views
+from ui_console.session.looking import pixels_of
 from ui_console.web.key_sight import LIST_STREAM, KeySight
-from ui_console.web.pictures import jpeg, packet, pixels_in
+from ui_console.web.pictures import jpeg, packet
 
 # All times are machine seconds.
 SHOWN_EVERY_S = 0.1  # chosen: a person cannot follow more
@@ -132,7 +133,7 @@ class Viewed:
         if picture is None:
             return b"", self._view.trouble
         try:
-            return jpeg(pixels_in(picture)), self._view.trouble
+            return jpeg(pixels_of(picture)), self._view.trouble
         except ValueError as error:
             return b"", f"the picture cannot be shown: {error}"
 

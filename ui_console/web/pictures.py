@@ -8,8 +8,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ui_console.model.message_views import PixelPicture
-
 COLOR_QUALITY = 90  # chosen: no chroma subsampling, so that marks of single pixels keep their color
 PLAN_PX = 1024  # chosen: longest edge of a floor plan on a page; its JPEG has the size of some ten pictures
 QUALITY = 70  # of 100; measured: 7.5 kB for 320×240 of a noisy room, 0.2 ms; no visible difference for driving
@@ -36,16 +34,6 @@ def jpeg(picture: NDArray[np.uint8]) -> bytes:
     if not done:
         raise ValueError(f"no JPEG can be made of {picture.shape}")
     return packed.tobytes()
-
-
-def pixels_in(picture: PixelPicture) -> NDArray[np.uint8]:
-    """Return grey levels of shape (height, width), or red, green and blue of shape (height, width, 3).
-
-    Raises:
-        ValueError: There are too few or too many pixels.
-    """
-    shape = (picture.height_px, picture.width_px, 3) if picture.is_color else (picture.height_px, picture.width_px)
-    return np.frombuffer(picture.pixels, np.uint8).reshape(shape)
 
 
 def plan_jpeg(image: bytes) -> bytes:
