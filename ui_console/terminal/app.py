@@ -29,7 +29,7 @@ from ui_console.terminal.lines import robot_rows
 from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
 from ui_console.terminal.order_dialog import order_dialog
 from ui_console.terminal.tables import FIXED, PanelName
-from ui_console.terminal.view_dialogs import ViewDialog, ViewPicker
+from ui_console.terminal.view_dialogs import ViewDialog, views_dialog
 from ui_console.terminal.widgets import DrivePad, Panel
 
 A = TypeVar("A")
@@ -350,20 +350,23 @@ class ConsoleApp(ConsoleDisplay):
         if not views:
             self.notify("no behavior shows anything yet", severity="warning")
             return
-        self._open(ViewPicker(views), lambda chosen: self._open(self._view_dialog(*chosen)))
+        self._open(views_dialog(views), lambda chosen: self._open(self._view_dialog(*chosen)))
 
     def _view_dialog(self, behavior: str, view: str) -> ViewDialog:
         keep_looking = partial(self._session.keep_looking, behavior, view)
-        has_pixels = self._has_pixels and self.profile is Profile.MONITOR  # the terminal keeps one picture
-        return ViewDialog(f"{component_of(behavior)}: {view}", keep_looking, has_pixels=has_pixels)
+        return ViewDialog(f"{component_of(behavior)}: {view}", keep_looking, has_pixels=self._has_free_pixels)
 
     def action_heard(self) -> None:
         """List the keys on the bus, and show the messages of the chosen key."""
         self._open(KeyPicker(self._session.keep_listing), lambda row: self._open(self._key_dialog(row)))
 
     def _key_dialog(self, row: KeyRow) -> KeyDialog:
-        has_pixels = self._has_pixels and self.profile is Profile.MONITOR  # the terminal keeps one picture
-        return KeyDialog(row, self._session.keep_hearing, self._session.now_s, has_pixels=has_pixels)
+        return KeyDialog(row, self._session.keep_hearing, self._session.now_s, has_pixels=self._has_free_pixels)
+
+    @property
+    def _has_free_pixels(self) -> bool:
+        """True if a dialog may show real pixels, of which the terminal keeps one picture."""
+        return self._has_pixels and self.profile is Profile.MONITOR
 
     def action_bare(self) -> None:
         """Show the picture alone, or everything again."""

@@ -173,41 +173,46 @@ class DialogChoice(Generic[T]):
 
     Attributes:
         line: The line.
+        result: Returns the answer for the typed values, or raises ``WrongValue``.
         title: Title of its fields.
         fields: Label and first text of each of them.
-        result: Returns the answer for the typed values, or raises ``WrongValue``.
     """
 
     line: Text
-    title: str
-    fields: Sequence[tuple[str, str]]
     result: Callable[[list[str]], T]
+    title: str = ""
+    fields: Sequence[tuple[str, str]] = ()
 
 
 class ChoiceDialog(Dialog[T]):
     """Choose a line, then fill in its fields, if any; the answer is the result of the choice.
 
     Args:
-        robot: The robot concerned.
         question: Title of the list.
         choices: Lines to choose from.
+        robot: The robot concerned; empty: none.
+        begins_at: Number of the line at which the cursor begins.
     """
 
-    def __init__(self, robot: str, question: str, choices: Sequence[DialogChoice[T]]) -> None:
+    def __init__(
+        self, question: str, choices: Sequence[DialogChoice[T]], *, robot: str = "", begins_at: int = 0
+    ) -> None:
         super().__init__()
-        self._robot, self._question, self._choices = robot, question, choices
+        self._question, self._choices, self._robot, self._begins_at = question, choices, robot, begins_at
         self._chosen: DialogChoice[T] | None = None
 
     @property
     def subject(self) -> str:
-        """The robot."""
+        """The robot; empty: none."""
         return self._robot
 
     def compose(self) -> ComposeResult:
         """Lay out the list."""
         with Vertical(id="choice") as box:
             box.border_title = self._question
-            yield OptionList(*(Option(choice.line) for choice in self._choices))
+            options = OptionList(*(Option(choice.line) for choice in self._choices))
+            options.highlighted = self._begins_at
+            yield options
 
     async def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Answer, or ask for the fields of the choice first."""
@@ -242,7 +247,8 @@ class ChoiceDialog(Dialog[T]):
 
 def command_dialog(robot: str, commands: Sequence[RoleCommand]) -> ChoiceDialog[GiveWish]:
     """Return the dialog that answers with one of these commands of the robot."""
-    return ChoiceDialog(robot, f"which command for {robot}? (enter chooses it)", list(map(_command_choice, commands)))
+    question = f"which command for {robot}? (enter chooses it)"
+    return ChoiceDialog(question, list(map(_command_choice, commands)), robot=robot)
 
 
 def _command_choice(command: RoleCommand) -> DialogChoice[GiveWish]:
@@ -250,9 +256,9 @@ def _command_choice(command: RoleCommand) -> DialogChoice[GiveWish]:
     labels = zip(command.labels, form.fields, strict=True)
     return DialogChoice(
         Text.assemble((command.title, "bold"), f"  {form.doc}" if form.doc else ""),
+        lambda values: GiveWish(form.word, read_fields(form.fields, values), command.role),
         f"{command.title} (enter gives it)",
         [(f"{label}{f'  {field.doc}' if field.doc else ''}", default_text(field)) for label, field in labels],
-        lambda values: GiveWish(form.word, read_fields(form.fields, values), command.role),
     )
 
 

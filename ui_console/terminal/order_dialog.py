@@ -33,14 +33,14 @@ def order_dialog(robot: str, held: Sequence[str]) -> ChoiceDialog[Sequence[Order
     every = tuple(sorted({robot, *held}))
     groups = {"": (robot,)} | ({f"all {len(every)}: ": every} if len(every) > 1 else {})
     choices = [_choice(kind, robot, robots, who) for who, robots in groups.items() for kind in WORDS]
-    return ChoiceDialog(robot, f"what is {robot} to do by itself? (enter chooses it)", choices)
+    return ChoiceDialog(f"what is {robot} to do by itself? (enter chooses it)", choices, robot=robot)
 
 
 def _choice(kind: OrderKind, robot: str, robots: tuple[str, ...], who: str) -> DialogChoice[Sequence[Order]]:
     words = who + WORDS[kind]
     fields = [(label, "") for label in LABELS.get(kind, ())]
     title = f"{words} (enter gives the order)"
-    return DialogChoice(Text(words), title, fields, lambda values: group(order_of(kind, robot, values), robots))
+    return DialogChoice(Text(words), lambda values: group(order_of(kind, robot, values), robots), title, fields)
 
 
 def order_of(kind: OrderKind, robot: str, values: Sequence[str]) -> Order:

@@ -7,13 +7,10 @@ from typing import ClassVar, Protocol
 import msgspec
 from rich.text import Text
 from textual import events
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Vertical
 from textual.message import Message
 from textual.screen import Screen
-from textual.widgets import OptionList, Static
-from textual.widgets.option_list import Option
+from textual.widgets import Static
 
 from backbone.printable_text import printable
 from backbone.recording.markers import Marker, MarkerKind
@@ -24,7 +21,7 @@ from ui_console.model.views import ConsoleView
 from ui_console.session.recorded_play import NOT_NOW
 from ui_console.session.verbs import Session
 from ui_console.terminal.app import ConsoleApp
-from ui_console.terminal.dialogs import Dialog, LineQuestion, Reading
+from ui_console.terminal.dialogs import ChoiceDialog, DialogChoice, LineQuestion, Reading
 from ui_console.terminal.keys import STOPS, Hint, help_lines
 from ui_console.terminal.recorded_keys import PLAYS, looking_keys, recorded_hints, refused_keys
 
@@ -34,6 +31,7 @@ MARKS = {
     MarkerKind.GRANT: ("▲", "green"),
     MarkerKind.REVOKED: ("▽", "yellow"),
 }
+LEGEND = "▲ a grant  ▽ its end  ! an alarm  ● an action of a person"
 TIME_EACH_S = 0.25  # chosen: the position moves one column at a time
 HERE = "bold black on white"
 PLAY_ON_S = 1.0  # chosen: pressed again while it plays, the key goes to the marker before; seconds of the machine
@@ -80,7 +78,7 @@ class TimeBar(Static):
         here = self._line.column(at_s, columns)
         cells[here] = (cells[here][0].replace("─", "│"), HERE)
         last = self._line.upto(at_s)
-        text = Text.assemble(*cells, "\n", _marker_text(last) if last is not None else Text(_legend(), "dim"))
+        text = Text.assemble(*cells, "\n", _marker_text(last) if last is not None else Text(LEGEND, "dim"))
         text.no_wrap = True
         self.update(text)
 
@@ -91,29 +89,20 @@ class TimeBar(Static):
             self.post_message(self.Chosen(self._line.time(at.x, max(1, self.content_size.width))))
 
 
-class MarkerPicker(Dialog[float]):
-    """Choose a marker; the answer is its time.
+def marker_dialog(line: TimeLine, at_s: float) -> ChoiceDialog[float]:
+    """Return the dialog that answers with the time of a marker.
 
     Args:
         line: The time of the recording.
         at_s: The present time; the cursor begins at the last marker before it.
     """
+    last = line.upto(at_s)
+    begins_at = line.markers.index(last) if last is not None else 0
+    return ChoiceDialog("markers (enter goes there)", list(map(_marker_choice, line.markers)), begins_at=begins_at)
 
-    def __init__(self, line: TimeLine, at_s: float) -> None:
-        super().__init__()
-        self._markers, self._last = line.markers, line.upto(at_s)
 
-    def compose(self) -> ComposeResult:
-        """Lay out the list."""
-        with Vertical() as box:
-            box.border_title = "markers (enter goes there)"
-            options = OptionList(*(Option(_marker_text(marker)) for marker in self._markers))
-            options.highlighted = self._markers.index(self._last) if self._last is not None else 0
-            yield options
-
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Answer."""
-        self.answer(self._markers[event.option_index].at_s)
+def _marker_choice(marker: Marker) -> DialogChoice[float]:
+    return DialogChoice(_marker_text(marker), lambda _values: marker.at_s)
 
 
 class RecordedApp(ConsoleApp, inherit_bindings=False):
@@ -216,7 +205,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
     def action_markers(self) -> None:
         """Choose a marker, and go to its time."""
         if self._line.markers:
-            self._open(MarkerPicker(self._line, self._at_s), self._go_to)
+            self._open(marker_dialog(self._line, self._at_s), self._go_to)
         else:
             self.notify("nothing is marked: no grant, no alarm, no action of a person", severity="warning")
 
@@ -253,7 +242,3 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
 def _marker_text(marker: Marker) -> Text:
     mark, style = MARKS[marker.kind]
     return Text.assemble((f"{mark} ", style), (f"{marker.at_s:.1f} s  ", "dim"), printable(marker.line))
-
-
-def _legend() -> str:
-    return "▲ a grant  ▽ its end  ! an alarm  ● an action of a person"

@@ -10,16 +10,15 @@ from rich.text import Text
 from textual import work
 from textual.app import ComposeResult
 from textual.containers import Vertical
-from textual.widgets import OptionList, Static
-from textual.widgets.option_list import Option
+from textual.widgets import Static
 
 from backbone.debug_views import ViewPicture, Views, ViewValue
 from backbone.errors import LinkError, Refusal
 from backbone.naming import component_of
 from backbone.printable_text import printable_lines
-from ui_console.model.debug_views import shown_text, view_rows
+from ui_console.model.debug_views import ViewRow, shown_text, view_rows
 from ui_console.session.looking import pixels_of
-from ui_console.terminal.dialogs import Dialog
+from ui_console.terminal.dialogs import ChoiceDialog, Dialog, DialogChoice
 from ui_console.terminal.widgets import Video
 
 Show = Callable[[ViewPicture | ViewValue], None]
@@ -27,36 +26,21 @@ Trouble = Callable[[Refusal | LinkError], None]
 KeepLooking = Callable[[Show, Trouble], Coroutine[object, None, None]]
 
 
-class ViewPicker(Dialog[tuple[str, str]]):
-    """Pick a view; the answer is its behavior's address and its name.
+def views_dialog(views: Mapping[str, Views]) -> ChoiceDialog[tuple[str, str]]:
+    """Return the dialog that answers with the address of a behavior and the name of one of its views.
 
     Args:
         views: Views of each behavior, by address.
     """
+    width = max((len(component_of(address)) for address, found in views.items() if found.views), default=0)
+    choices = [_view_choice(at, row, width) for at, found in views.items() for row in view_rows(found.views)]
+    return ChoiceDialog("what the behaviors see (enter shows it)", choices)
 
-    def __init__(self, views: Mapping[str, Views]) -> None:
-        super().__init__()
-        self._rows = [(address, row) for address, found in views.items() for row in view_rows(found.views)]
 
-    def compose(self) -> ComposeResult:
-        """Lay out the list."""
-        with Vertical() as box:
-            box.border_title = "what the behaviors see (enter shows it)"
-            width = max((len(component_of(address)) for address, _row in self._rows), default=0)
-            lines = [
-                Text.assemble(
-                    f"{component_of(address):<{width}}  ",
-                    (row.view, "bold"),
-                    "" if row.is_picture else f"  {printable_lines(row.text)}",
-                )
-                for address, row in self._rows
-            ]
-            yield OptionList(*map(Option, lines))
-
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Answer."""
-        address, row = self._rows[event.option_index]
-        self.answer((address, row.view))
+def _view_choice(address: str, row: ViewRow, width: int) -> DialogChoice[tuple[str, str]]:
+    text = "" if row.is_picture else f"  {printable_lines(row.text)}"
+    line = Text.assemble(f"{component_of(address):<{width}}  ", (row.view, "bold"), text)
+    return DialogChoice(line, lambda _values: (address, row.view))
 
 
 class ViewDialog(Dialog[None]):
