@@ -39,7 +39,10 @@ class SeenViews(msgspec.Struct, frozen=True):
 
 def view_rows(entries: Sequence[ViewEntry]) -> list[ViewRow]:
     """Return a row for each view, in the same order."""
-    return [_picture_row(entry) if entry.kind is ViewKind.PICTURE else _value_row(entry) for entry in entries]
+    return [
+        ViewRow(one.view, True) if one.kind is ViewKind.PICTURE else ViewRow(one.view, False, shown_text(one.value))
+        for one in entries
+    ]
 
 
 def shown_text(value: float | bool | str) -> str:
@@ -52,11 +55,3 @@ def shown_text(value: float | bool | str) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return value if isinstance(value, str) else f"{value:.6g}"
-
-
-def _picture_row(entry: ViewEntry) -> ViewRow:
-    return ViewRow(entry.view, True)
-
-
-def _value_row(entry: ViewEntry) -> ViewRow:
-    return ViewRow(entry.view, False, shown_text(entry.value))

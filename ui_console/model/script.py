@@ -207,7 +207,11 @@ class ScriptPlayer:
         self._ended = steps is not None
         self._drive: Motion | None = None
         self._next_s = 0.0
-        self._over = self.must_let_go = self._waits = False
+        self.must_let_go = False
+        self.waits = False
+        """True while the script waits for the end of an order."""
+        self.is_over = False
+        """True when the robot must be or was given back."""
         self.held_back = 0
         """Number of lines skipped because no halt preceded them."""
 
@@ -217,17 +221,7 @@ class ScriptPlayer:
 
     def order_over(self) -> None:
         """Continue, because the order for which the script waits is over."""
-        self._waits = False
-
-    @property
-    def waits(self) -> bool:
-        """True while the script waits for the end of an order."""
-        return self._waits
-
-    @property
-    def is_over(self) -> bool:
-        """True when the robot must be or was given back."""
-        return self._over
+        self.waits = False
 
     def add(self, step: Step) -> None:
         """Add a step; a step whose time has passed is due at once."""
@@ -244,20 +238,20 @@ class ScriptPlayer:
             since_grant_s: Mission seconds since the grant.
         """
         wishes: list[Wish] = []
-        while self._steps and self._steps[0].at_s <= since_grant_s and not (self._over or self._waits):
+        while self._steps and self._steps[0].at_s <= since_grant_s and not (self.is_over or self.waits):
             wish = self._steps.popleft().wish
             self.must_let_go = self.must_let_go and not isinstance(wish, HaltWish)
             if self.must_let_go and self._is_motion(wish):
                 self.held_back += 1
                 continue
-            self._over = isinstance(wish, GiveBack)
-            self._waits = isinstance(wish, OrderWish) and wish.until_done
+            self.is_over = isinstance(wish, GiveBack)
+            self.waits = isinstance(wish, OrderWish) and wish.until_done
             if isinstance(wish, Motion | HaltWish | GiveBack | OrderWish):
                 self._drive = wish if isinstance(wish, Motion) else None
             self._next_s = since_grant_s + REPEAT_EVERY_S
             wishes.append(wish)
-        if self._ended and not self._steps and not (self._over or self._waits):
-            self._over = True
+        if self._ended and not self._steps and not (self.is_over or self.waits):
+            self.is_over = True
             wishes.append(GiveBack())
         if not wishes and self._drive is not None and since_grant_s >= self._next_s:
             self._next_s = since_grant_s + REPEAT_EVERY_S
@@ -270,7 +264,7 @@ class ScriptPlayer:
     @property
     def next_s(self) -> float | None:
         """Seconds since the grant at which the next command is due; None: not before another step arrives."""
-        if self._over or self._waits:
+        if self.is_over or self.waits:
             return None
         times = [self._steps[0].at_s] if self._steps else [0.0] if self._ended else []
         if self._drive is not None:
