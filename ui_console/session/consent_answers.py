@@ -43,7 +43,7 @@ class ConsentAnswers:
         self._bus, self._user, self._clock, self._show, self._acted = bus, user, clock, show, acted
         self._desk = ConsentDesk(user)
         self._answers: dict[tuple[str, str, Topic], asyncio.Future[Consent]] = {}
-        self.yield_robot: Callable[[list[Settled]], None] = self.settle
+        self.yield_robot: Callable[[list[Settled]], object] = self.settle
         """Called with the settled questions if the robot must be released; it calls ``settle`` afterwards."""
 
     async def seek(self, asker: str, user: str, robot: str, why: str, topic: Topic) -> Consent:

@@ -63,7 +63,7 @@ class ConsentTalk:
 
     def __init__(self, console: AnyObserver, give_back: Callable[[str, str], Awaitable[None]]) -> None:
         self._console, self._give_back = console, give_back
-        console.answers.yield_robot = self._begin_to_yield
+        console.answers.yield_robot = lambda settled: console.start_task(self._yield_to(settled), "consent")
         self._unanswered = 0
         self._open: dict[str, AskConsent] = {}
 
@@ -174,9 +174,6 @@ class ConsentTalk:
         if at_once is not None:
             return at_once
         return await self._console.answers.seek(asker, asked.user, asked.robot, asked.why, Topic.TAKE)
-
-    def _begin_to_yield(self, settled: list[Settled]) -> None:
-        self._console.start_task(self._yield_to(settled), "consent")
 
     async def _yield_to(self, settled: list[Settled]) -> None:
         """Release the robot, then answer, so that the asker finds the robot free."""

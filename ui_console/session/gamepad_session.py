@@ -12,6 +12,7 @@ from typing import assert_never
 from backbone.bus.interface import Clock
 from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode
+from backbone.waiting import first_to_end
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent
 from ui_console.model.orders import Order, OrderKind
@@ -59,7 +60,8 @@ class GamepadSession(Session):
         self._console = console
         for line in buttons_help():
             self._write(line)
-        beside = asyncio.create_task(self._play_and_print(gamepad, console.clock), name="gamepad and lines")
+        both = first_to_end(self._play(gamepad, console.clock), self._print(console.clock))
+        beside = asyncio.create_task(both, name="gamepad and lines")
         beside.add_done_callback(lambda _beside: console.end("the gamepad cannot be read"))
         try:
             await console.run()
@@ -68,11 +70,6 @@ class GamepadSession(Session):
             await asyncio.wait({beside})
             if not beside.cancelled():
                 beside.result()
-
-    async def _play_and_print(self, gamepad: FoundGamepad, clock: Clock) -> None:
-        async with asyncio.TaskGroup() as group:
-            group.create_task(self._play(gamepad, clock), name="gamepad")
-            group.create_task(self._print(clock), name="lines")
 
     async def _print(self, clock: Clock) -> None:
         """Print changes."""

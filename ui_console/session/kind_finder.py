@@ -5,14 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from backbone.addresses import COMPONENT_DATABASE, DEPENDENCY_DATABASE
-from backbone.component.asking import ask_until_answered
 from backbone.component_database.messages import ComponentType, ListTypes, Types
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import LinkError, Refusal
-from backbone.wire import Message
 from ui_console.model.arc_abilities import ArcAbilities, arc_abilities
 from ui_console.model.arc_kinds import NoArcKind, arc_kind
 from ui_console.model.profile import Sight
@@ -21,9 +19,7 @@ if TYPE_CHECKING:
     from ui_console.session.claim import TeleoperationParameters
     from ui_console.session.observer import AnyObserver
 
-Reply = TypeVar("Reply", bound=Message)
 ASK_AGAIN = "Take the robot again in a moment; 'scout-backbone status' names what is absent."
-EACH_S, WITHIN_S = 1.0, 5.0  # chosen: a restarted core service is back within one or two seconds; mission seconds
 
 log = logging.getLogger(__name__)
 
@@ -102,12 +98,8 @@ class KindFinder:
             self._know(self._known[1])
 
     async def _ask_types(self) -> list[ComponentType]:
-        answer = await self._ask(COMPONENT_DATABASE, ListTypes(), Types)
+        answer = await self._console.ask_core(COMPONENT_DATABASE, ListTypes(), Types)
         return [one.component_type for one in answer.types]
 
     async def _ask_resources(self) -> list[Resource]:
-        return (await self._ask(DEPENDENCY_DATABASE, AskResources(), Resources)).resources
-
-    async def _ask(self, of: str, question: Message, reply: type[Reply]) -> Reply:
-        bus, clock = self._console.bus, self._console.clock
-        return await ask_until_answered(bus, clock, of, question, reply, each_s=EACH_S, within_s=WITHIN_S)
+        return (await self._console.ask_core(DEPENDENCY_DATABASE, AskResources(), Resources)).resources

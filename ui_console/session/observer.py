@@ -10,6 +10,7 @@ from typing import ClassVar, Generic, TypeVar
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.mission_time import was_started_again
@@ -23,13 +24,16 @@ from ui_console.model.consent import Consent, Topic, require_console
 from ui_console.model.events import ConsoleEvent, Heard, LinkHeard
 from ui_console.model.lifting import AskLift
 from ui_console.session.consent_answers import ConsentAnswers
-from ui_console.session.feed import ConsoleFeed, FeedEvent
+from ui_console.session.feed import REPLY_TIME_S, ConsoleFeed, FeedEvent
 from ui_console.session.lift_talk import LiftTalk
 from ui_console.session.map_feed import MapFeed
 
 log = logging.getLogger(__name__)
 
+FACTS_WITHIN_S = 5.0  # chosen: a restarted core service is back within a second or two; machine seconds
+
 T = TypeVar("T")
+Reply = TypeVar("Reply", bound=Message)
 P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
 
 UNLISTED = "robots that this console does not know"
@@ -155,6 +159,17 @@ class Observer(Component[P_co], Generic[P_co]):
     def person(self) -> str:
         """Return the person at this console; empty for a console that serves other people and has its own name."""
         return self.user if self.user != self.name else ""
+
+    async def ask_core(self, of: str, question: Message, reply: type[Reply]) -> Reply:
+        """Return the answer of a core service, which may be restarting.
+
+        Raises:
+            LinkError: It did not answer within ``FACTS_WITHIN_S``.
+            Refusal: It refused the question.
+        """
+        return await ask_until_answered(
+            self.bus, self.clock, of, question, reply, each_s=REPLY_TIME_S, within_s=FACTS_WITHIN_S
+        )
 
     async def connect(self) -> None:
         """Subscribe to the mission's messages."""

@@ -10,10 +10,9 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar, assert_never
+from typing import assert_never
 
 from backbone.addresses import COMPONENT_DATABASE, DEPENDENCY_DATABASE, NAMESERVER, PLACER, RC_MANAGER
-from backbone.component.asking import ask_until_answered
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.component_database.messages import ListTypes, Types
 from backbone.dependency_database.messages import AskResources, Resources
@@ -29,7 +28,6 @@ from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 from backbone.waiting import end_tasks
-from backbone.wire import Message
 from ui_console.model.events import OrderChanged
 from ui_console.model.order_book import Begin, EndBehavior, Instruction, OrderBook, Rest, ShowOrder, Take, Yield
 from ui_console.model.order_facts import NEEDS_PLACES, behavior_of, kind_for, localizer_of, start_of
@@ -37,11 +35,9 @@ from ui_console.model.orders import GivenOrder, Order, OrderState
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.observer import Observer
 
-Reply = TypeVar("Reply", bound=Message)
 log = logging.getLogger(__name__)
 
-REPLY_TIME_S = 1.0  # chosen: core services and behaviors answer in milliseconds
-FACTS_WITHIN_S = 5.0  # chosen: a restarted core service is back within a second or two; machine seconds
+REPLY_TIME_S = 1.0  # chosen: behaviors answer in milliseconds
 END_WITHIN_S = 30.0  # chosen: as for ARCs, because a host may be busy
 AGAIN_AFTER_S = 0.2  # chosen: a restarted placer is back after one or two of these intervals; machine seconds
 DRAIN_WITHIN_S = 1.0  # chosen: behaviors that still run then end by themselves as soon as the console is gone
@@ -236,9 +232,9 @@ class OrderKeeper:
         assert given is not None  # noqa: S101  the order is removed only after its task was cancelled
         console, order = self._console, given.order
         types, hardware, there = await asyncio.gather(
-            self._ask(COMPONENT_DATABASE, ListTypes(), Types),
-            self._ask(DEPENDENCY_DATABASE, AskResources(), Resources),
-            self._ask(NAMESERVER, ListComponents(), Components),
+            console.ask_core(COMPONENT_DATABASE, ListTypes(), Types),
+            console.ask_core(DEPENDENCY_DATABASE, AskResources(), Resources),
+            console.ask_core(NAMESERVER, ListComponents(), Components),
         )
         kind = kind_for(order, [one.component_type for one in types.types], hardware.resources)
         localizer = localizer_of(there.components) if order.kind in NEEDS_PLACES else None
@@ -268,7 +264,7 @@ class OrderKeeper:
             RC_MANAGER, Conversation.SCHEDULE, Schedule, lambda envelope: look(envelope.body), latest=True
         )
         try:
-            look(await self._ask(RC_MANAGER, AskSchedule(), Schedule))
+            look(await self._console.ask_core(RC_MANAGER, AskSchedule(), Schedule))
             await is_queued.wait()
         except (LinkError, Refusal) as error:
             log.info("the schedule is not known: %s", error)
@@ -310,10 +306,6 @@ class OrderKeeper:
             else:
                 return
             await console.clock.sleep_s(AGAIN_AFTER_S * console.clock.rate)
-
-    async def _ask(self, of: str, question: Message, reply: type[Reply]) -> Reply:
-        bus, clock = self._console.bus, self._console.clock
-        return await ask_until_answered(bus, clock, of, question, reply, each_s=REPLY_TIME_S, within_s=FACTS_WITHIN_S)
 
 
 def _outcome(payload: Mapping[str, object]) -> str:

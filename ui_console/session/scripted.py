@@ -168,7 +168,8 @@ class ScriptDriver:
                     console.interrupt()
                 match wish:
                     case GiveBack():
-                        self._show_wrong_line(clock.now_s())
+                        if self._wrong is not None:
+                            self._write(events.event_json(events.failed(clock.now_s(), self._wrong)))
                         await console.give_back("the script is over")
                         return
                     case StopRobot() | StopAll():
@@ -209,10 +210,6 @@ class ScriptDriver:
         if next_s is not None:
             wait_s = max(0.0, granted_s + next_s - console.clock.now_s()) / console.clock.rate
         await set_within(self._news, wait_s)
-
-    def _show_wrong_line(self, now_s: float) -> None:
-        if self._wrong is not None:
-            self._write(events.event_json(events.failed(now_s, self._wrong)))
 
 
 def feed_from(descriptor: int, feed: Callable[[str | None], None], cut: Callable[[OSError], None]) -> None:
