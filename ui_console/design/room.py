@@ -19,7 +19,6 @@ from backbone.mission.edit import Path, outline
 from backbone.mission.reader import MissionInvalid
 from ui_console.design.answers import (
     AskAnswer,
-    DesignAnswer,
     FileChangedAnswer,
     NoticeAnswer,
     RefusalAnswer,
@@ -58,24 +57,18 @@ from ui_console.design.views import (
     status_view,
 )
 from ui_console.web.login import ProtocolViolation, Welcome
-from ui_console.web.outbox import Outbox
+from ui_console.web.page_client import PageClient
 
 log = logging.getLogger(__name__)
 
 LookUpClasses = Callable[[Sequence[str]], Awaitable[dict[str, ClassFacts]]]
 
 
-class Designer:
-    """A person at a page.
-
-    Args:
-        welcome: Identity of the person.
-    """
+class Designer(PageClient):
+    """A person at a page of the designer."""
 
     def __init__(self, welcome: Welcome) -> None:
-        self.welcome = welcome
-        self.outbox = Outbox()
-        self.news = asyncio.Event()
+        super().__init__(welcome)
         self.at: Path = ()
         """The element shown to this person."""
         self.selected = 0
@@ -84,15 +77,9 @@ class Designer:
         self.handled = 0
         """Number of changes carried out or refused; the page sends one change at a time."""
 
-    def put(self, name: str, view: object) -> None:
+    def show(self, name: str, view: object) -> None:
         """Queue a section of the view."""
-        self.outbox.put_section(name, msgspec.json.encode(view))
-        self.news.set()
-
-    def answer(self, answer: DesignAnswer) -> None:
-        """Queue an answer."""
-        self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
-        self.news.set()
+        self.put(name, msgspec.json.encode(view))
 
 
 class DesignRoom:
@@ -121,7 +108,7 @@ class DesignRoom:
         """Return a new designer, whose page gets the whole view."""
         client = Designer(welcome)
         self.clients[client] = None
-        client.put("welcome", DesignerWelcomed(welcome.user))
+        client.show("welcome", DesignerWelcomed(welcome.user))
         if self._sections:
             self._send(client)
         self._send_people()
@@ -159,7 +146,7 @@ class DesignRoom:
             client.answer(RefusalAnswer(refusal.detail, refusal.remedy, is_change))
         if is_change:
             client.handled += 1
-            client.put("handled", client.handled)
+            client.show("handled", client.handled)
 
     async def _do(self, client: Designer, intent: DesignIntent) -> None:
         match intent:
@@ -286,22 +273,22 @@ class DesignRoom:
         if self._rehearsal[0] != self.revision:
             self._rehearsal = (self.revision, await asyncio.to_thread(_rehearsed, self.draft))
         for client in watching:
-            client.put("rehearsal", self._rehearsal[1])
+            client.show("rehearsal", self._rehearsal[1])
 
     def _send(self, client: Designer) -> None:
         for name, body in self._sections.items():
-            client.outbox.put_section(name, body)
-        client.put("status", status_view(self.draft, self.revision, self._changed_by))
+            client.put(name, body)
+        client.show("status", status_view(self.draft, self.revision, self._changed_by))
         self._send_element(client)
 
     def _send_element(self, client: Designer) -> None:
-        client.put("selected", client.selected)
-        client.put("element", element_view(self.draft, client.at, self._facts))
+        client.show("selected", client.selected)
+        client.show("element", element_view(self.draft, client.at, self._facts))
 
     def _send_people(self) -> None:
         users = sorted(client.welcome.user for client in self.clients)
         for client in self.clients:
-            client.put("people", users)
+            client.show("people", users)
 
 
 def _classes_of(saved: bytes | None) -> set[str]:

@@ -30,8 +30,8 @@ from ui_console.web.found_log import FoundLog
 from ui_console.web.key_sight import KeySight, NoSuchKey
 from ui_console.web.login import Welcome
 from ui_console.web.ordering import Ordering
-from ui_console.web.outbox import Outbox
 from ui_console.web.own_console import OwnConsole
+from ui_console.web.page_client import PageClient
 from ui_console.web.sights import PageSight
 
 log = logging.getLogger(__name__)
@@ -79,8 +79,8 @@ class OperatorServices(Protocol):
         """Record that an operator watches other messages on the bus."""
 
 
-class Operator:
-    """A person at a browser, from authentication to the end of the connection.
+class Operator(PageClient):
+    """A person at a browser.
 
     Args:
         services: Services of the server.
@@ -89,10 +89,7 @@ class Operator:
     """
 
     def __init__(self, services: OperatorServices, welcome: Welcome, former: Operator | None = None) -> None:
-        self.welcome = welcome
-        self.outbox: Outbox = Outbox() if former is None else former.outbox
-        self.news: asyncio.Event = asyncio.Event() if former is None else former.news
-        """Set when there is something to send."""
+        super().__init__(welcome, former)
         self.is_there = True
         self.sight: PageSight = PageSight() if former is None else former.sight
         """The debug views that this page shows."""
@@ -143,7 +140,7 @@ class Operator:
                 self._console.act(lambda console: console.begin_ask_consent(why))
             case protocol.Decide(is_given, number):
                 if not self.answers.decide(is_given, number=number):
-                    self._answer({"refused": "no answer was given: that question is over"})
+                    self.refuse("no answer was given: that question is over")
             case protocol.DismissLost():
                 self.model.dismiss_lost()
                 self.refresh(self._services.clock.now_s())
@@ -197,8 +194,7 @@ class Operator:
 
     def show_views(self, seen: SeenViews) -> None:
         """Send the list of a behavior's debug views."""
-        self.outbox.put_section("seen", msgspec.json.encode(seen))
-        self.news.set()
+        self.put("seen", msgspec.json.encode(seen))
 
     def saw_view(self, stream: str, number: int, at_s: float, packed: bytes) -> None:
         """Send a picture of a debug view, or the newest of the messages that this page watches."""
@@ -207,16 +203,15 @@ class Operator:
 
     def refresh(self, now_s: float) -> None:
         """Send the changes of this operator's own part of the view, and of the alarms."""
-        model, put = self.model, self.outbox.put_section
+        model, put = self.model, self.put
         model.sees = model.robot in self.outbox.watched
         model.look(now_s)
         put("own", view_json(model.own(now_s)))
         put("abilities", view_json(model.abilities))
-        put("robots", _encode(model.robots(now_s)))
-        put("links", _encode(model.links(now_s)))
-        put("alarms", _encode(model.alarm_views()))
+        put("robots", msgspec.json.encode(model.robots(now_s)))
+        put("links", msgspec.json.encode(model.links(now_s)))
+        put("alarms", msgspec.json.encode(model.alarm_views()))
         put("drawn", msgspec.json.encode({robot: round(at, 3) for robot, at in sorted(self._latency_s.items())}))
-        self.news.set()
 
     def schedule_heard(self) -> None:
         """React to a new schedule: ask why this operator waits, if so."""
@@ -232,14 +227,14 @@ class Operator:
         if moment == self.model.moment:
             self._console.act(lambda console: console.give(wish))
         else:
-            self._answer({"refused": f"{wish.word} was not given: the robot's state has changed; press again"})
+            self.refuse(f"{wish.word} was not given: the robot's state has changed; press again")
 
     def _begin_order(self, moment: int, intent: protocol.OrderRequest | protocol.PictureOrder) -> None:
         """Give orders, unless a robot was stopped, freed, granted or lost since the page showed it."""
         if moment == self.model.moment:
             self._begin(intent)
         else:
-            self._answer({"refused": "no order was given: the robot's state has changed; tap again"})
+            self.refuse("no order was given: the robot's state has changed; tap again")
 
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)
@@ -261,7 +256,7 @@ class Operator:
         try:
             self.key_sight = self.key_sight.after(intent, self._services.hidden)
         except NoSuchKey as refusal:
-            self._answer({"refused": f"{refusal.detail}. {refusal.remedy}"})
+            self.refuse(f"{refusal.detail}. {refusal.remedy}")
             return
         self.outbox.open_beside(self.key_sight.streams)
         self._services.keys_changed()
@@ -286,7 +281,7 @@ class Operator:
         if intent == next(reversed(self._work.values()), None):
             return
         if isinstance(intent, Asked) and len(self._work) >= MOST_ASKED:
-            self._answer({"refused": "too much is being asked at once; wait for the answers"})
+            self.refuse("too much is being asked at once; wait for the answers")
             return
         task = asyncio.create_task(self._do(intent), name=f"{self.welcome.user}:{type(intent).__name__}")
         self._work[task] = intent
@@ -317,14 +312,14 @@ class Operator:
             case protocol.LiftRequest(robot, number):
                 await observer.lift_stop(robot, number, user, self.show)
             case protocol.WhyRequest(name):
-                self._answer({"why": name, "lines": await observer.why(name)})
+                self.answer({"why": name, "lines": await observer.why(name)})
             case protocol.ParametersRequest(name):
-                self._answer({"parameters": name, "told": await observer.feed.ask_parameters(name)})
+                self.answer({"parameters": name, "told": await observer.feed.ask_parameters(name)})
             case protocol.SearchLog():
                 await self._search(intent)
             case protocol.SetRequest(name, parameter, value):
                 is_set = await observer.set_parameter(name, parameter, value, user)
-                self._answer({"set": name, "parameter": parameter, "done": is_set})
+                self.answer({"set": name, "parameter": parameter, "done": is_set})
             case _:
                 assert_never(intent)
         self.refresh(self._services.clock.now_s())
@@ -337,7 +332,7 @@ class Operator:
             found = await self._services.observer.feed.search_log(wanted.asked(now))
         except Refusal as refusal:
             refused = {"code": code_of(refusal), "refused": refusal.detail, "remedy": refusal.remedy}
-            self._answer({"log": {"number": wanted.number, **refused}})
+            self.answer({"log": {"number": wanted.number, **refused}})
             return
         self._found = FoundLog(wanted.number, found, now)
         self._hand_out(wanted.number, 0)
@@ -345,7 +340,7 @@ class Operator:
     def _hand_out(self, number: int, first: int) -> None:
         """Send a part of the result, unless the page means an earlier search."""
         if self._found is not None and self._found.number == number:
-            self._answer({"log": self._found.part(first)})
+            self.answer({"log": self._found.part(first)})
 
     async def _stop(self, robot: str) -> None:
         """Emergency stop; the wheels that this operator drives also stop."""
@@ -356,16 +351,16 @@ class Operator:
 
     def _report_unsure(self, robots: list[str]) -> None:
         if robots:
-            self._answer({"refused": f"not certain to have stopped: {', '.join(robots)}"})
+            self.refuse(f"not certain to have stopped: {', '.join(robots)}")
 
     async def _order(self, intent: protocol.OrderRequest | protocol.PictureOrder) -> None:
         try:
             is_given = await self._console.order(lambda: self._ordering.orders_for(intent))
         except Refusal as refusal:
-            self._answer({"refused": f"{refusal.detail}. {refusal.remedy}"})
+            self.refuse(f"{refusal.detail}. {refusal.remedy}")
             return
         if not is_given:
-            self._answer({"refused": "no order was given: your console is not ready; tap again"})
+            self.refuse("no order was given: your console is not ready; tap again")
 
     async def _new_console(self, robot: str, orders: Sequence[Order]) -> Teleoperation:
         console = await self._services.new_console(self, robot, orders)
@@ -380,11 +375,3 @@ class Operator:
         self._stops.discard(task)
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._services.observer.fail(bug)
-
-    def _answer(self, answer: dict[str, object]) -> None:
-        self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
-        self.news.set()
-
-
-def _encode(views: Sequence[object]) -> bytes:
-    return msgspec.json.encode(views)

@@ -27,7 +27,7 @@ from ui_console.web.login import (
     ViolationKind,
     Welcome,
 )
-from ui_console.web.outbox import Outbox
+from ui_console.web.page_client import PageClient
 from ui_console.web.page_files import SOCKET_PATH, Answer, PageFiles, is_own_page
 from ui_console.web.pending_connections import CLOSE_WITHIN_S, OPEN_WITHIN_S, PendingConnections
 
@@ -54,23 +54,7 @@ class CannotListen(Refusal):
     remedy = "Choose another address with --host, or another port with --port."
 
 
-class Client(Protocol):
-    """A person at a page, from authentication to the end of the connection."""
-
-    @property
-    def welcome(self) -> Welcome:
-        """Identity."""
-
-    @property
-    def outbox(self) -> Outbox:
-        """Messages not sent yet."""
-
-    @property
-    def news(self) -> asyncio.Event:
-        """Set when there is a message to send."""
-
-
-ClientT = TypeVar("ClientT", bound=Client)
+ClientT = TypeVar("ClientT", bound=PageClient)
 HeardT_contra = TypeVar("HeardT_contra", contravariant=True)
 
 
@@ -243,8 +227,7 @@ class PageServer(Generic[ClientT, IntentT]):
                     if said.is_fatal:
                         return said.line
                 case BeatRequest(number):
-                    client.outbox.put_section("beat", str(number).encode())
-                    client.news.set()
+                    client.put("beat", str(number).encode())
                 case Welcome() | None:
                     continue
                 case _:

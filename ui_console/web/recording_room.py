@@ -5,7 +5,6 @@ A hub receives the messages that ``RecordedPlay`` plays. A jump replaces the hub
 
 from __future__ import annotations
 
-import asyncio
 import os
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -27,7 +26,7 @@ from ui_console.web.key_ears import RecordingEar
 from ui_console.web.key_watch import KeyWatch
 from ui_console.web.login import ProtocolViolation, Welcome
 from ui_console.web.operator import Operator
-from ui_console.web.outbox import Outbox
+from ui_console.web.page_client import PageClient
 from ui_console.web.playing import Looking, Playing, PlayOn, ShowTime, StandStill, StepOn
 from ui_console.web.protocol import Intent, ParametersRequest, SearchLog, WhyRequest
 
@@ -64,35 +63,16 @@ class RecordedHub(WebHub):
         await first_to_end(self.observer.run(), self.refresh_all())
 
 
-class Viewer:
+class Viewer(PageClient):
     """A person at a page that shows a recording.
 
     Args:
-        operator: The operator at the present hub.
+        operator: The operator at the present hub, with the same messages for the page at any time of the recording.
     """
 
     def __init__(self, operator: Operator) -> None:
+        super().__init__(operator.welcome, operator)
         self.operator = operator
-
-    @property
-    def welcome(self) -> Welcome:
-        """Identity."""
-        return self.operator.welcome
-
-    @property
-    def outbox(self) -> Outbox:
-        """Messages for the page; the same object at any time of the recording."""
-        return self.operator.outbox
-
-    @property
-    def news(self) -> asyncio.Event:
-        """Set when there is something to send."""
-        return self.operator.news
-
-    def refuse(self, why: str) -> None:
-        """Send the page a refusal."""
-        self.outbox.put_answer(msgspec.json.encode({"answer": {"refused": why}}))
-        self.news.set()
 
 
 class RecordingRoom:
@@ -120,7 +100,7 @@ class RecordingRoom:
         """Return a new viewer, whose page gets the whole view."""
         viewer = Viewer(self._hub.enter(welcome))
         self.clients[viewer] = None
-        viewer.outbox.put_section("markers", self._markers)
+        viewer.put("markers", self._markers)
         self._tell([viewer])
         return viewer
 
@@ -190,5 +170,4 @@ class RecordingRoom:
             )
         )
         for viewer in viewers:
-            viewer.outbox.put_section("playback", body)
-            viewer.news.set()
+            viewer.put("playback", body)
