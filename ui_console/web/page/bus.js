@@ -4,7 +4,7 @@ import { idOf, KeyTable, toldOf } from "./key_list.js";
 import { KeyView } from "./key_view.js";
 import { set } from "./text.js";
 
-/** @import { KeyList, KeyRow, MessageShown } from "./messages.d.ts" */
+/** @import { KeyList, KeyRow } from "./messages.d.ts" */
 /** @import { Picture, Say } from "./types.d.ts" */
 
 const LOOK_EVERY_MS = 250;
@@ -114,8 +114,9 @@ export class BusKeys {
       this.view?.saw(packet);
       return;
     }
-    if (stream === LIST && this.chosen === null) this.showList(JSON.parse(new TextDecoder().decode(jpeg)));
-    else if (stream === `/fields/${this.number}`) this.showMessage(JSON.parse(new TextDecoder().decode(jpeg)));
+    const said = () => JSON.parse(new TextDecoder().decode(jpeg));
+    if (stream === LIST && this.chosen === null) this.showList(said());
+    else if (stream === `/fields/${this.number}`) this.view?.show(said());
     requestAnimationFrame(() => this.drawn(stream, number));
   }
 
@@ -123,10 +124,5 @@ export class BusKeys {
   showList(list) {
     set(this.given.told, toldOf(list));
     this.table.draw(list.rows);
-  }
-
-  /** @param {MessageShown} message */
-  showMessage(message) {
-    this.view?.show(message);
   }
 }

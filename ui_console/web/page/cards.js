@@ -1,6 +1,6 @@
 // One card for each robot: its newest picture, its holder, and the operator's actions. One card is large.
 
-import { make } from "./dom.js";
+import { make, makeButton } from "./dom.js";
 import { Gauges, lineOf } from "./gauges.js";
 import { actWhenHeld } from "./holding.js";
 import { ofMission } from "./missions.js";
@@ -191,10 +191,7 @@ class Card {
    * @param {string} what
    */
   button(label, what) {
-    const made = make("button", "", label);
-    made.type = "button";
-    made.addEventListener("click", () => this.act(what, this.name));
-    return made;
+    return makeButton(label, () => this.act(what, this.name));
   }
 
   /**

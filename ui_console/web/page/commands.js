@@ -161,11 +161,7 @@ class Control {
 /** @param {FieldForm} field */
 function selectOf(field) {
   const select = make("select");
-  for (const choice of field.choices) {
-    const option = make("option", "", choice);
-    option.value = choice;
-    select.append(option);
-  }
+  select.append(...field.choices.map((choice) => new Option(choice, choice)));
   select.value = String(firstOf(field));
   return select;
 }

@@ -96,6 +96,21 @@ export function makeNotice(kind, text) {
   return made;
 }
 
+/**
+ * Offers these words after the first ones of a list, which are kept; returns whether they changed.
+ *
+ * @param {HTMLElement} list
+ * @param {string[]} words
+ * @param {number} [kept]
+ */
+export function offer(list, words, kept = 0) {
+  const options = queryAll(list, "option", HTMLOptionElement).slice(kept);
+  if (options.map((option) => option.value).join("\n") === words.join("\n")) return false;
+  for (const option of options) option.remove();
+  for (const word of words) list.append(new Option(word, word));
+  return true;
+}
+
 /** @type {Record<string, number | undefined>} */
 const STEPS = { ArrowLeft: -1, ArrowRight: 1 };
 

@@ -1,6 +1,6 @@
 // The mission's log: the newest events, or the result of a search, which can be saved as a file.
 
-import { find, make, makeButton } from "./dom.js";
+import { find, make, makeButton, offer } from "./dom.js";
 import { table } from "./table.js";
 import { seconds, set } from "./text.js";
 
@@ -98,7 +98,7 @@ export class Log {
     const list = /** @type {HTMLSelectElement} */ (this.field("robot"));
     const before = list.value;
     if (offer(list, robots, 1)) list.value = robots.includes(before) ? before : "";
-    offer(find("log-people"), [...people].sort(), 0);
+    offer(find("log-people"), [...people].sort());
   }
 
   /** @param {string} name */
@@ -209,19 +209,4 @@ function cells(row) {
     row.person,
     row.where,
   ];
-}
-
-/**
- * Set the words that a list offers after its fixed ones; returns whether they changed.
- *
- * @param {HTMLElement} list
- * @param {string[]} words
- * @param {number} kept
- */
-function offer(list, words, kept) {
-  const options = [...list.querySelectorAll("option")].slice(kept);
-  if (options.map((option) => option.value).join("\n") === words.join("\n")) return false;
-  for (const option of options) option.remove();
-  for (const word of words) list.append(new Option(word, word));
-  return true;
 }

@@ -1,6 +1,6 @@
 // The map: robots are selected on it and sent to places; their orders are shown, and taken back.
 
-import { find, keepingFocus, make, makeButton } from "./dom.js";
+import { find, keepingFocus, make, makeButton, offer } from "./dom.js";
 import { age, drawBody, drawCross, drawFloor, drawGoal } from "./map_draw.js";
 import { listed, meantBy, Plan, stepped } from "./map_plan.js";
 import { isOver } from "./orders.js";
@@ -161,11 +161,8 @@ export class RobotMap {
 
   drawTargets() {
     const names = this.bodies.map((body) => body.name);
-    const shown = [...this.target.options].map((option) => option.value);
-    if (shown.join() === names.join()) return;
     const chosen = this.target.value;
-    this.target.replaceChildren(...names.map((name) => new Option(name, name)));
-    if (names.includes(chosen)) this.target.value = chosen;
+    if (offer(this.target, names) && names.includes(chosen)) this.target.value = chosen;
   }
 
   drawButtons() {

@@ -1,6 +1,6 @@
 // Debug views: the views of one behavior, and the pictures of one view.
 
-import { make } from "./dom.js";
+import { make, offer } from "./dom.js";
 import { Screen } from "./pictures.js";
 import { set } from "./text.js";
 
@@ -160,14 +160,6 @@ export class Seen {
  */
 function fill(select, names) {
   const chosen = chosenOf(names, select.value);
-  const offered = [...select.options].map((one) => one.value);
-  if (offered.length !== names.length || names.some((one, at) => one !== offered[at])) {
-    const options = names.map((name) => {
-      const option = make("option", "", name);
-      option.value = name;
-      return option;
-    });
-    select.replaceChildren(...options);
-  }
+  offer(select, names);
   if (select.value !== chosen) select.value = chosen;
 }
