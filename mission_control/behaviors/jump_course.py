@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 
 from mission_control.behaviors.motion import (
+    PATIENCE_S,
     FloorPoint,
     Maneuver,
     Motion,
@@ -32,7 +33,6 @@ AIMED_RAD = math.radians(4.0)  # chosen: 4 cm aside at the landing
 LANDED_AFTER_S = 3.0  # measured: 0.42 s until the kick is over, 0.7 s of flight, and 2.4 s until the spring is wound
 BEYOND_M = 0.06  # chosen: half a body length; then no wheel stands on the obstacle
 ARRIVED_M = 0.08  # chosen: less than a body
-PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 
 
 class JumpStage(StrEnum):

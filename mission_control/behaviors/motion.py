@@ -24,6 +24,7 @@ TURN_PER_S = 2.5  # chosen: an error of heading shrinks to a tenth in a second; 
 SLOW_PER_S = 1.5  # chosen: the robot slows down over the last 0.2 m before a place and stops without overshoot
 FARTHEST_M = 1000.0  # chosen: the largest room
 MOST_TIMES = 100_000  # chosen: once a minute for ten weeks
+PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 TURN_FIRST_RAD = math.radians(50.0)  # chosen: beyond it a robot turns on the spot, so that its path stays short
 
 DrivingSpeed = Annotated[float, Meta(gt=0, le=MOST_M_S)]
@@ -195,6 +196,43 @@ class Watchdog:
         if distance_m <= self._nearest_m - self.STEP_M:
             self._nearest_m, self._since_s = distance_m, now_s
         return now_s - self._since_s >= self._patience_s
+
+
+class Pursuit:
+    """Drives a robot to goals, and shakes it free when it is stuck.
+
+    Args:
+        speed_m_s: Speed on straight ways.
+    """
+
+    def __init__(self, speed_m_s: float) -> None:
+        self._speed_m_s = speed_m_s
+        self._watchdog = Watchdog(PATIENCE_S, speed_m_s)
+        self._freeing: Maneuver | None = None
+        self.freed = 0
+        """Number of times that a stuck robot was shaken free."""
+
+    def rest(self) -> None:
+        """Restart the time until the robot counts as stuck; see ``Watchdog.rest``."""
+        self._watchdog.rest()
+
+    def interrupt(self) -> None:
+        """Record the loss of the robot; the next motion is from its position then."""
+        self._freeing = None
+        self._watchdog.pause()
+
+    def go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
+        """Return the motion towards the goal, or the one that frees a stuck robot."""
+        if self._freeing is None and self._watchdog.is_stuck(goal.distance_m(position), now_s):
+            self._freeing = shake_free()
+            self._watchdog.rest()
+            self.freed += 1
+        if self._freeing is not None:
+            motion = self._freeing.motion(now_s)
+            if motion is not None:
+                return motion
+            self._freeing = None
+        return head_for(position, goal, self._speed_m_s)
 
 
 def _within(value: float, most: float) -> float:

@@ -14,19 +14,9 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mission_control.behaviors.motion import (
-    STILL,
-    FloorPoint,
-    Maneuver,
-    Motion,
-    Position,
-    Watchdog,
-    head_for,
-    shake_free,
-)
+from mission_control.behaviors.motion import STILL, FloorPoint, Motion, Position, Pursuit
 
 REMEMBERED = 1000  # chosen: hours of an ordinary patrol
-PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 LONGEST_STEP_S = 0.5  # chosen: if decisions are further apart, the robot stood still or was not granted
 BACK_AT = 2.0  # chosen: tolerances; a robot that was carried farther away during its rest drives back
 
@@ -61,16 +51,13 @@ class PatrolRoute:
     ) -> None:
         self._places = tuple(places)
         self._last = rounds * len(self._places) if rounds else math.inf
-        self._speed_m_s, self._within_m, self._rest_s = speed_m_s, reached_within_m, rest_s
+        self._within_m, self._rest_s = reached_within_m, rest_s
         self._visits: deque[Visit] = deque(maxlen=REMEMBERED)
         self.reached = 0
         """Number of arrivals, over all rounds."""
-        self.freed = 0
-        """Number of times that a stuck robot was shaken free."""
         self._resting_s = 0.0  # remaining rest at the last way point
         self._decided_s: float | None = None
-        self._watchdog = Watchdog(PATIENCE_S, speed_m_s)
-        self._freeing: Maneuver | None = None
+        self._pursuit = Pursuit(speed_m_s)
 
     @property
     def visits(self) -> Sequence[Visit]:
@@ -80,6 +67,11 @@ class PatrolRoute:
     def visits_since(self, number: int) -> Sequence[Visit]:
         """Return the kept arrivals after this number."""
         return tuple(visit for visit in self._visits if visit.number > number)
+
+    @property
+    def freed(self) -> int:
+        """Number of times that a stuck robot was shaken free."""
+        return self._pursuit.freed
 
     @property
     def next_waypoint(self) -> int:
@@ -93,8 +85,8 @@ class PatrolRoute:
 
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision continues from its position then."""
-        self._decided_s = self._freeing = None
-        self._watchdog.pause()
+        self._decided_s = None
+        self._pursuit.interrupt()
 
     def decide(self, position: Position, now_s: float) -> Motion:
         """Return the next motion; record a way point that is reached.
@@ -107,8 +99,8 @@ class PatrolRoute:
         if self._resting_s > 0:
             here = self._places[(self.reached - 1) % len(self._places)]
             if here.distance_m(position) > BACK_AT * self._within_m:
-                return self._go(here, position, now_s)
-            self._watchdog.rest()
+                return self._pursuit.go(here, position, now_s)
+            self._pursuit.rest()
             self._resting_s -= passed_s
             if self._resting_s > 0:
                 return STILL
@@ -116,21 +108,11 @@ class PatrolRoute:
             return STILL
         goal = self._places[self.next_waypoint]
         if goal.distance_m(position) > self._within_m:
-            return self._go(goal, position, now_s)
+            return self._pursuit.go(goal, position, now_s)
         self._visits.append(Visit(self.reached + 1, self.next_waypoint, now_s))
         self.reached += 1
         self._resting_s = self._rest_s
-        self._watchdog.rest()
-        return STILL if self._rest_s or self.is_over else self._go(self._places[self.next_waypoint], position, now_s)
-
-    def _go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
-        if self._freeing is None and self._watchdog.is_stuck(goal.distance_m(position), now_s):
-            self._freeing = shake_free()
-            self._watchdog.rest()
-            self.freed += 1
-        if self._freeing is not None:
-            motion = self._freeing.motion(now_s)
-            if motion is not None:
-                return motion
-            self._freeing = None
-        return head_for(position, goal, self._speed_m_s)
+        self._pursuit.rest()
+        if self._rest_s or self.is_over:
+            return STILL
+        return self._pursuit.go(self._places[self.next_waypoint], position, now_s)

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from mission_control.behaviors.motion import FloorPoint, Maneuver, Motion, Position, Watchdog, head_for, shake_free
+from mission_control.behaviors.motion import FloorPoint, Motion, Position, Pursuit
 
 NEAR_M = 0.25  # chosen: the mark is found from within 2.5 m, so more precision is useless
 AWAY_M = 1.0  # chosen: from farther away the robot first drives near the place
-PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 
 
 class PickupStage(StrEnum):
@@ -34,13 +33,12 @@ class PickupRoute:
     """
 
     def __init__(self, near: FloorPoint, *, speed_m_s: float, attempts: int) -> None:
-        self._near, self._speed_m_s, self._attempts = near, speed_m_s, attempts
+        self._near, self._attempts = near, attempts
         self.stage = PickupStage.UNKNOWN
         """How the robot navigates."""
         self.in_vain = 0
         """Number of unsuccessful searches for the mark."""
-        self._watchdog = Watchdog(PATIENCE_S, speed_m_s)
-        self._freeing: Maneuver | None = None
+        self._pursuit = Pursuit(speed_m_s)
 
     def interrupt(self) -> None:
         """Record the loss of the robot; its view decides how it continues, or its position then."""
@@ -48,8 +46,7 @@ class PickupRoute:
             self.stage = PickupStage.LOOK
         elif self.stage is not PickupStage.FAILED:
             self.stage = PickupStage.UNKNOWN
-        self._freeing = None
-        self._watchdog.pause()
+        self._pursuit.interrupt()
 
     def looked(self, *, is_seen: bool) -> None:
         """Record whether the mark is still in sight after an interruption; if not, the position decides."""
@@ -59,7 +56,7 @@ class PickupRoute:
         """Record an unsuccessful search all around."""
         self.in_vain += 1
         self.stage = PickupStage.FAILED if self.in_vain >= self._attempts else PickupStage.TRAVEL
-        self._watchdog.rest()
+        self._pursuit.rest()
 
     def decide(self, position: Position, now_s: float) -> Motion:
         """Return the next motion; called only in the stages ``UNKNOWN`` and ``TRAVEL``.
@@ -75,12 +72,4 @@ class PickupRoute:
         if distance_m <= NEAR_M:
             self.stage = PickupStage.BY_SIGHT
             return Motion()
-        if self._freeing is None and self._watchdog.is_stuck(distance_m, now_s):
-            self._freeing = shake_free()
-            self._watchdog.rest()
-        if self._freeing is not None:
-            motion = self._freeing.motion(now_s)
-            if motion is not None:
-                return motion
-            self._freeing = None
-        return head_for(position, self._near, self._speed_m_s)
+        return self._pursuit.go(self._near, position, now_s)

@@ -15,8 +15,8 @@ from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_order
 from mission_control.behaviors.driver import Driver
 from mission_control.behaviors.hide import Hide
+from mission_control.behaviors.motion import PATIENCE_S
 from mission_control.behaviors.patrol import Patrol
-from mission_control.behaviors.patrol_route import PATIENCE_S
 from mission_control.behaviors.servo_to_target import ServoToTarget
 from mission_control.laboratory.simulation.whole_mission import RunningMission
 from mission_control.messages import BehaviorStatus
