@@ -80,9 +80,10 @@ def check_sendable(message: Message, most_bytes: int = MAX_MESSAGE_BYTES) -> Non
     except (TypeError, BufferError) as error:  # a field of a class that no message may have; memory with gaps
         told = f"{type(message).__name__} cannot be sent: {error}"
         raise UnwritableMessage(told, remedy="Give fields of the declared types, and memory without gaps.") from error
-    _reader(type(message)).read(raw, most_bytes)
+    reader_of(type(message)).read(raw, most_bytes)
 
 
 @lru_cache(maxsize=1024)
-def _reader(kind: type[Message]) -> Reader[Message]:
+def reader_of(kind: type[Message]) -> Reader[Message]:
+    """Return a reader of this class, the same at each call."""
     return Reader(kind)

@@ -15,12 +15,12 @@ import io
 import pickle
 import typing
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from backbone.errors import Refusal
 from backbone.naming import did_you_mean
-from backbone.wire import MAX_LARGE_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, Reader, write
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, write
+from mission_control.laboratory.module_kit.encoding_network import reader_of
 from mission_control.modules.exchangeable import is_of
 from mission_control.modules.module import Module, default_name
 from mission_control.modules.orders import is_message
@@ -167,7 +167,7 @@ def check_value(what: str, port: Port, kind: object, value: object) -> None:
         most = MAX_LARGE_MESSAGE_BYTES
         try:
             written = write(Envelope(WIRE_VERSION, "kit/kit", 0, 0.0, "", value), most)
-            same = write(_reader(type(value)).read(written, most), most) == written
+            same = write(reader_of(type(value)).read(written, most), most) == written
         except (Refusal, TypeError, BufferError) as error:  # a field of another class; pixels with gaps between them
             cause, remedy = (error.detail, error.remedy) if isinstance(error, Refusal) else (str(error), "")
             raise ModuleRuleBroken(f"{what} cannot cross the bus: {cause}", remedy=remedy) from None
@@ -182,11 +182,6 @@ def _check_unchanged(module: str, struct: object, before: Pickles) -> None:
                 f"{module} changed {name} of {type_name(type(struct))} after it was handed over",
                 remedy="Make a new object, because others have the same one.",
             )
-
-
-@lru_cache(maxsize=1024)
-def _reader(kind: type[Message]) -> Reader[Message]:
-    return Reader(kind)
 
 
 def _pickles(struct: object) -> Pickles:

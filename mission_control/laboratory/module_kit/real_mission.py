@@ -181,7 +181,8 @@ class RealMission:
     def down(self) -> int:
         """Take the mission down by command; return the exit code of ``up``."""
         done = self.command("scout-backbone", "down", "--mission", self.name)
-        _must_succeed(done)
+        if done.returncode != 0:
+            raise AssertionError(f"{done.args} ends with {done.returncode}: {done.stderr}")
         return self.launcher.wait(DOWN_WITHIN_S)
 
 
@@ -304,11 +305,6 @@ def _read(mission: RealMission) -> None:
         mission.news.set()
     mission.is_over = True
     mission.news.set()
-
-
-def _must_succeed(done: subprocess.CompletedProcess[str]) -> None:
-    if done.returncode != 0:
-        raise AssertionError(f"{done.args} ends with {done.returncode}: {done.stderr}")
 
 
 BringUp = Callable[..., AbstractContextManager[RealMission]]
