@@ -9,45 +9,17 @@ from __future__ import annotations
 import asyncio
 import inspect
 import logging
-from collections.abc import Coroutine
-from typing import Protocol
 
-from backbone.bus.interface import Clock
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, OutcomeUnknown
 from mission_control.behavior_hooks import BehaviorHooks
-from mission_control.behavior_tree import BehaviorNode
+from mission_control.behavior_of_parts import BehaviorOfParts
 from mission_control.child_keeper import AGAIN_AFTER_S
-from mission_control.gated_bus import GatedBus
-from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import ArcClient, EmergencyStopped, StaleEpoch, SwappedOut
 
 log = logging.getLogger(__name__)
 
 CANCELLED_WITHIN_S = 0.1  # chosen: half the time in which a behavior must note the end of its grant; machine seconds
-
-
-class Actor(Protocol):
-    """The interface of the behavior that ``Acting`` needs."""
-
-    gate: GatedBus
-    clock: Clock
-    status: BehaviorStatus
-    feedback: str
-    child_nodes: dict[str, BehaviorNode]
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
-        """Run work as a task, unless the behavior is ending."""
-
-    def report(self, feedback: str) -> None:
-        """Set the feedback."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
-        """Add an event to the story and to the mission's log."""
 
 
 class Acting:
@@ -62,7 +34,7 @@ class Acting:
             commanded meanwhile.
     """
 
-    def __init__(self, actor: Actor, hooks: BehaviorHooks) -> None:
+    def __init__(self, actor: BehaviorOfParts, hooks: BehaviorHooks) -> None:
         self.resumes_again = self._has_told = False
         self._actor, self._hooks, self._clock = actor, hooks, actor.clock
         self._task: asyncio.Task[None] | None = None

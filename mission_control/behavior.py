@@ -358,7 +358,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         return BranchTaken(str(self.status) if self.status.is_final else "")
 
     def rules_applied(self) -> None:
-        """Report the result of the children's rules after an event; see ``ParentOfChildren``."""
+        """Report the result of the children's rules after an event; see ``BehaviorOfParts``."""
         self.children_arranged()
         self.suspension_changed()
 
@@ -386,7 +386,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         await end_by_placer(self.bus, self.clock, self.name, f"its order is over: {why_over}")
 
     def suspension_changed(self) -> None:
-        """Report the reason of the suspension if it has changed; see ``OwnerOfArc``."""
+        """Report the reason of the suspension if it has changed; see ``BehaviorOfParts``."""
         self.own_reports.suspension_changed()
 
     def begin_task(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:

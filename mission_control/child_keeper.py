@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.asking import ask_until_answered
 from backbone.component.messages import Absence, LogLevel
-from backbone.component.story import StoryBook
 from backbone.creator.messages import ProcessFell, creator_name
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
-from backbone.mission.behavior_orders import PathStep
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
 from backbone.wire import Envelope
-from mission_control.behavior_tree import BehaviorNode
+from mission_control.behavior_of_parts import BehaviorOfParts
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus
 
 log = logging.getLogger(__name__)
@@ -32,39 +29,12 @@ START_PATIENCE_S = 60.0  # chosen: a link cut of 30 s, and the attempts that beg
 AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back after one or two of these intervals; machine seconds
 
 
-class Parent(Protocol):
-    """The interface of the behavior that the keeper of its children needs."""
-
-    bus: Bus
-    clock: Clock
-    story: StoryBook
-    child_nodes: dict[str, BehaviorNode]
-    """Name of a child → its present node."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def path(self) -> Sequence[PathStep]:
-        """Present names and priorities from the mission's root to the behavior."""
-
-    def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
-        """Run work as a task, unless the behavior is ending."""
-
-    def changed(self) -> None:
-        """Note that ``absences`` may have changed."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
-        """Publish an event about the subject to the mission's log."""
-
-
 class ChildKeeper:
     """Starts, adopts and stops the children of one behavior."""
 
     def __init__(
         self,
-        parent: Parent,
+        parent: BehaviorOfParts,
         reported: Callable[[str, BehaviorStatus, Mapping[str, object], str], None],
         left: Callable[[str], None],
     ) -> None:

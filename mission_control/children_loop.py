@@ -11,10 +11,11 @@ import asyncio
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, assert_never
+from typing import assert_never
 
 from backbone.component.messages import Absence
-from mission_control.child_keeper import ChildKeeper, Parent
+from mission_control.behavior_of_parts import BehaviorOfParts
+from mission_control.child_keeper import ChildKeeper
 from mission_control.children import Children, Decision, FinishParent, Instruction, StartChild, StopChild
 from mission_control.messages import BehaviorStatus
 
@@ -28,19 +29,6 @@ class ChildOrder:
     is_done: asyncio.Event = field(default_factory=asyncio.Event)
 
 
-class ParentOfChildren(Parent, Protocol):
-    """The interface of the behavior that the loop of its children needs; see ``BehaviorHooks`` for its decisions."""
-
-    async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:
-        """Decide what follows the end of a child."""
-
-    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
-        """Conclude after the end of all children."""
-
-    def rules_applied(self) -> None:
-        """Called after the rules have handled an event."""
-
-
 class ChildrenLoop:
     """Passes the events of children and the time to the rules, and carries out the answers.
 
@@ -49,7 +37,7 @@ class ChildrenLoop:
         rules: The rules that decide.
     """
 
-    def __init__(self, parent: ParentOfChildren, rules: Children) -> None:
+    def __init__(self, parent: BehaviorOfParts, rules: Children) -> None:
         self.rules = rules
         """The state of the children."""
         self._parent, self._clock, self._nodes = parent, parent.clock, parent.child_nodes

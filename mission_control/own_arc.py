@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Mapping
 
 import msgspec
 
 from backbone.component.messages import Absence
-from backbone.component.story import StoryBook
 from backbone.errors import LinkError, Refusal
-from backbone.mission.behavior_orders import PathStep
 from backbone.reading_anew import WrongClass
-from mission_control.acting import Acting, Actor, cancel
+from mission_control.acting import Acting, cancel
 from mission_control.behavior_hooks import BehaviorHooks, suspended_because
+from mission_control.behavior_of_parts import BehaviorOfParts
 from mission_control.behavior_tree import ArcNeed
 from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_task, why
 from mission_control.messages import BehaviorStatus
@@ -44,33 +42,6 @@ REST_S = 0.5  # chosen: as at the end of a slice; stopping needs one command
 NO_GRANT_YET = "no grant yet"
 
 
-class OwnerOfArc(Actor, Protocol):
-    """The interface of the behavior that ``OwnArc`` needs; see ``BehaviorHooks`` for its decisions."""
-
-    story: StoryBook
-
-    @property
-    def address(self) -> str:
-        """Its address."""
-
-    @property
-    def path(self) -> Sequence[PathStep]:
-        """Present names and priorities from the mission's root to the behavior."""
-
-    @property
-    def is_ordered(self) -> bool:
-        """True: an operator ordered it."""
-
-    def changed(self) -> None:
-        """Note that ``absences`` may have changed."""
-
-    def suspension_changed(self) -> None:
-        """Called when the reason of its suspension may have changed."""
-
-    def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
-        """Finish."""
-
-
 class OwnArc:
     """Claims the ARC, keeps it, calls the hooks at the begin and end of grants, and releases it; an ``ArcListener``.
 
@@ -87,7 +58,7 @@ class OwnArc:
         acting: The task in which the behavior uses the grant.
     """
 
-    def __init__(self, owner: OwnerOfArc, hooks: BehaviorHooks) -> None:
+    def __init__(self, owner: BehaviorOfParts, hooks: BehaviorHooks) -> None:
         self.client: ArcClient | None = None
         self.claimed: ArcNeed | None = None
         self.rcs: Mapping[str, str] = {}

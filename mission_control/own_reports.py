@@ -2,40 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Coroutine, Sequence
-from typing import Protocol
-
-from backbone.bus.interface import Bus, Clock
-from backbone.mission.behavior_orders import PathStep
 from backbone.naming import Subsystem, address
+from mission_control.behavior_of_parts import BehaviorOfParts
 from mission_control.keeper_reports import KeeperReports
 from mission_control.messages import BehaviorStatus, ChildReport
 from mission_control.parent_reports import ParentReports
-
-
-class Reporter(Protocol):
-    """The interface of the behavior that its reports need."""
-
-    bus: Bus
-    clock: Clock
-    status: BehaviorStatus
-    payload: dict[str, object]
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def path(self) -> Sequence[PathStep]:
-        """Names and priorities from the mission's root to it."""
-
-    @property
-    def suspended_because(self) -> str:
-        """Why the behavior is not at work."""
-
-    def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
-        """Run work as a task, unless the behavior is ending."""
 
 
 class OwnReports:
@@ -49,7 +20,7 @@ class OwnReports:
             tree.
     """
 
-    def __init__(self, behavior: Reporter) -> None:
+    def __init__(self, behavior: BehaviorOfParts) -> None:
         self.keeper: KeeperReports | None = None
         self._behavior = behavior
         self._parent: ParentReports | None = None
