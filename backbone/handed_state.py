@@ -45,12 +45,12 @@ def copy_for(kind: type, values: dict[str, object]) -> dict[str, object]:
         TypeError: A value cannot be copied.
     """
     file, shared = io.BytesIO(), list[object]()
-    _Writer(file, shared).dump(values)
+    _StateWriter(file, shared).dump(values)
     file.seek(0)
-    return cast(dict[str, object], _Reader(file, shared, _files(kind)).load())
+    return cast(dict[str, object], _StateReader(file, shared, _files(kind)).load())
 
 
-class _Writer(pickle.Pickler):
+class _StateWriter(pickle.Pickler):
     """Writes everything but the shared objects, which get a number."""
 
     def __init__(self, file: io.BytesIO, shared: list[object]) -> None:
@@ -64,8 +64,8 @@ class _Writer(pickle.Pickler):
         return len(self._shared) - 1
 
 
-class _Reader(pickle.Unpickler):
-    """Reads what ``_Writer`` wrote, with the classes of these files."""
+class _StateReader(pickle.Unpickler):
+    """Reads what ``_StateWriter`` wrote, with the classes of these files."""
 
     def __init__(self, file: io.BytesIO, shared: list[object], files: Files) -> None:
         super().__init__(file)

@@ -54,7 +54,7 @@ class RestartPolicy(Message, frozen=True):
     hung_after_s: Duration = 3.0
 
 
-class Declared(Message, frozen=True):
+class DeclaredClass(Message, frozen=True):
     """Class and parameters that the mission file declares for a component whose class was exchanged."""
 
     class_path: Line
@@ -89,7 +89,7 @@ class Spawn(Message, frozen=True):
     tags: Annotated[list[Mention], FEW] = []
     process: NameOrNone = ""
     alike_most: Count = 1
-    declared: Declared | None = None
+    declared: DeclaredClass | None = None
 
 
 class Spawned(Message, frozen=True):
@@ -111,7 +111,7 @@ class ReviseSpawn(Message, frozen=True):
     name: Name
     parameters: Values
     class_path: Line = ""
-    declared: Declared | None = None
+    declared: DeclaredClass | None = None
 
 
 class SpawnRevised(Message, frozen=True):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import msgspec
 
-from backbone.creator.messages import Declared, Spawn
+from backbone.creator.messages import DeclaredClass, Spawn
 from backbone.placer.messages import ReviseStart
 
 
@@ -16,9 +16,9 @@ def revised(order: Spawn, by: ReviseStart) -> Spawn:
     """Return the order of the component's next start; it keeps what the mission file declares."""
     declared, class_path = order.declared, by.class_path or order.class_path
     if declared is None and class_path != order.class_path:
-        declared = Declared(order.class_path, order.parameters)
+        declared = DeclaredClass(order.class_path, order.parameters)
     elif declared is not None and by.others_stay:  # a change of the tree, which holds for both classes
-        declared = Declared(declared.class_path, declared.parameters | by.parameters)
+        declared = DeclaredClass(declared.class_path, declared.parameters | by.parameters)
     parameters = (order.parameters if by.others_stay else {}) | by.parameters
     return msgspec.structs.replace(order, class_path=class_path, parameters=parameters, declared=declared)
 

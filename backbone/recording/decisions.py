@@ -47,7 +47,7 @@ class NoSuchRule(Refusal):
     remedy = "Name a rule and its value as the mission file does, such as policy=strict."
 
 
-class _Life:
+class _ManagerLife:
     """The present life of the RC manager, each of which numbers its messages anew."""
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class RecordedSchedule:
         self.lacks = "the recording has no state of the schedule"
         self.unread = 0
         self._number = 0
-        self._life = _Life()
+        self._life = _ManagerLife()
 
     def take(self, told: Decided | ScheduleSnapshot, message: Recorded) -> None:
         """Apply the next event, or take over the state of a snapshot; after one of another release it is not known.
@@ -308,7 +308,7 @@ def _steps(
 ) -> Iterator[ScheduleSnapshot | _RecordedDecision | None]:
     """Yield the snapshots, the decisions with their lines, and None between two lives of the RC manager."""
     step: _RecordedDecision | None = None
-    life = _Life()
+    life = _ManagerLife()
     for message in _in_order(recording.messages(since_s=since_s, source=RC_MANAGER)):
         unread, told = reviver.unread, reviver.revived(message, Decided, ScheduleSnapshot, TraceLine)
         if life.ended_before(message):

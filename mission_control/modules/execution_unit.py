@@ -141,7 +141,7 @@ class _Seat:
         return {key: value for name, key in self.outputs if (value := getattr(outputs, name)) is not None}
 
 
-class Waits(NamedTuple):
+class AwaitedKeys(NamedTuple):
     """What a module waits for.
 
     Attributes:
@@ -259,13 +259,13 @@ class ExecutionUnit:
         slot.put(value)
         return self._schedule.arrived(key)
 
-    def waits(self, module: str) -> Waits | None:
+    def waits(self, module: str) -> AwaitedKeys | None:
         """Return what the module waits for; None: the unit has no such module."""
         for seat in self._seats:
             if seat.name == module:
                 lacks = seat.lacks()
                 needs_all = any(one.port.is_required for one in lacks)
-                return Waits(seat.times.runs, {one.key: one.slot.number > 0 for one in lacks}, needs_all)
+                return AwaitedKeys(seat.times.runs, {one.key: one.slot.number > 0 for one in lacks}, needs_all)
         return None
 
     def tick(self, now_s: float) -> bool:

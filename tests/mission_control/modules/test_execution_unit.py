@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sample_modules import Counter, Doubler, Follower, Number, Sum, Summing
 
-from mission_control.modules.execution_unit import ExecutionUnit, ModuleTimes, Produced, Waits
+from mission_control.modules.execution_unit import AwaitedKeys, ExecutionUnit, ModuleTimes, Produced
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module, default_name
 from mission_control.modules.orders import WrongModule
@@ -75,11 +75,11 @@ def test_a_unit_names_the_inputs_that_a_module_waits_for() -> None:
     graph = Graph({"one": [Member("joining", Joining.ports())]}, {"a": NUMBER, "b": NUMBER, "newest": NUMBER})
     unit = ExecutionUnit("one", graph, {"joining": Joining()}, Trigger(), stopwatch=lambda: 0.0)
     unit.put("b", Number(1.0))
-    assert unit.waits("joining") == Waits(0, {"a": False}, needs_all=True)
+    assert unit.waits("joining") == AwaitedKeys(0, {"a": False}, needs_all=True)
     unit.put("a", Number(1.0))
-    assert unit.waits("joining") == Waits(0, {}, needs_all=False)
+    assert unit.waits("joining") == AwaitedKeys(0, {}, needs_all=False)
     unit.run(0.0)
-    assert unit.waits("joining") == Waits(1, {"a": True}, needs_all=True)
+    assert unit.waits("joining") == AwaitedKeys(1, {"a": True}, needs_all=True)
     assert unit.waits("nobody") is None
 
 
@@ -94,7 +94,7 @@ def test_a_module_with_optional_fresh_inputs_waits_for_one_of_them() -> None:
 
     graph = Graph({"one": [Member("either", Either.ports())]}, {"a": NUMBER, "b": NUMBER})
     unit = ExecutionUnit("one", graph, {"either": Either()}, Trigger(), stopwatch=lambda: 0.0)
-    assert unit.waits("either") == Waits(0, {"a": False, "b": False}, needs_all=False)
+    assert unit.waits("either") == AwaitedKeys(0, {"a": False, "b": False}, needs_all=False)
 
 
 def test_a_required_input_that_has_not_come_keeps_a_module_waiting_and_then_it_joins() -> None:
