@@ -10,7 +10,7 @@ import { seconds, set } from "./text.js";
 const LANES = ["alarm", "operator", "grant", "revoked"]; // from the top
 const LANE_PX = 8;
 /** @type {Record<string, string>} */
-const KINDS = { alarm: "alarm", operator: "somebody's action", grant: "grant", revoked: "end of a grant" };
+const KINDS = { alarm: "alarm", operator: "a person's action", grant: "grant", revoked: "end of a grant" };
 
 /**
  * The first marker after a time, or the last one before it; none: null.
