@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import logging
+import sys
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from importlib.metadata import entry_points
@@ -38,7 +39,7 @@ def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
         except Exception as error:  # a module that is being written raises anything
             log.warning("messages of %s are recorded without names: %s", module, complaint(error))
     named: dict[str, dict[str, type[Message]]] = defaultdict(dict)
-    for kind in _derived(Message):
+    for kind in filter(_is_in_its_module, _derived(Message)):
         named[schema_of(kind)][f"{kind.__module__}:{kind.__qualname__}"] = kind
     known: dict[str, type[Message]] = {}
     for schema, kinds in named.items():
@@ -51,6 +52,14 @@ def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
                 "messages of %s are recorded without names: rename a class, as %s stands twice", nameless, schema
             )
     return known
+
+
+def _is_in_its_module(kind: type[Message]) -> bool:
+    """Return whether the module of the class is there; the types of its fields are found in no other place.
+
+    A class outlives its module for a while if the module's import failed, or its file was read anew in vain.
+    """
+    return kind.__module__ in sys.modules
 
 
 def _derived(kind: type[Message]) -> Iterator[type[Message]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from backbone.recording.known_messages import GROUP, message_classes
+from backbone.recording.translation import Translator
 from resource_pool.messages import Frame
 
 
@@ -24,6 +25,23 @@ def test_a_module_that_cannot_be_imported_is_skipped_and_logged(
     with caplog.at_level(logging.WARNING):
         assert message_classes(["module_in_work"]) == message_classes()
     assert "messages of module_in_work are recorded without names" in caplog.text
+
+
+def test_a_class_without_its_module_is_none_of_the_classes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its fields have types that only the module knows, and ``watch`` ended with a NameError."""
+    lines = [
+        "from __future__ import annotations",
+        "from backbone.ranges import Share",
+        "from backbone.wire import Message",
+        "class LeakFound(Message, frozen=True):",
+        "    share: Share",
+        "raise OSError('the pump is off')",
+    ]
+    (tmp_path / "pump_in_work.py").write_text("\n".join(lines))
+    monkeypatch.syspath_prepend(tmp_path)
+    found = message_classes(["pump_in_work"])
+    assert "LeakFound/1" not in found
+    Translator(found)
 
 
 def test_a_class_of_ones_own_takes_no_name_from_another(
