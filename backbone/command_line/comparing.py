@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from backbone.command_line.joining import finite
-from backbone.command_line.opened_recording import opened
+from backbone.command_line.opened_recording import NothingSelected, opened
 from backbone.command_line.unusable_file import FileUnusable
-from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.recording.comparison import Difference, KeyComparison, Named, compared, pairs_in
@@ -19,26 +18,19 @@ from backbone.spoken import counted
 LONGEST_VALUE = 60  # chosen: two of them fit a line of a wide terminal
 
 
-class NothingToCompare(Refusal):
-    """No message of two recordings is selected."""
-
-    code = "recording.no_message"
-    remedy = "See 'scout-backbone recording keys FILE' for the keys of a recording."
-
-
 async def compare(
     first: Path, second: Path, keys: tuple[str, ...], tolerances: dict[str, float], *, as_json: bool
 ) -> ExitCode:
     """Print where two recordings differ by more than the tolerances; ``REFUSED`` if they do.
 
     Raises:
-        NothingToCompare: No message has one of these keys.
+        NothingSelected: No message has one of these keys.
     """
     with opened(first) as one, opened(second) as other:
         pairs = pairs_in(one.contents().counts, other.contents().counts)
         found = compared(one.messages(keys), other.messages(keys), tolerances, pairs)
         if keys and not found:
-            raise NothingToCompare(f"neither {first} nor {second} has a message whose key matches {' or '.join(keys)}")
+            raise NothingSelected(f"neither {first} nor {second} has a message whose key matches {' or '.join(keys)}")
         return print_comparison(found, as_json=as_json)
 
 

@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import ClassVar, Protocol
 
-from backbone.command_line.opened_recording import opened
+from backbone.command_line.opened_recording import opened, require_selected
 from backbone.command_line.unusable_file import new_folder
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.hearing import is_meant
@@ -72,11 +72,17 @@ class CsvTables:
 async def export(
     path: Path, folder: Path, keys: tuple[str, ...], make_tables: Callable[[Path], TableWriter], *, with_videos: bool
 ) -> ExitCode:
-    """Write a file for each key and schema into a new folder, with ``with_videos`` also an MP4 file for each camera."""
-    with opened(path) as recording, new_folder(folder):
-        with closing(make_tables(folder)) as tables:
-            names, rows = _write_tables(recording, tables, keys)
-        videos = import_module(VIDEOS).write_videos(recording, folder, keys) if with_videos else []
+    """Write a file for each key and schema into a new folder, with ``with_videos`` also an MP4 file for each camera.
+
+    Raises:
+        NothingSelected: No message has one of these keys.
+    """
+    with opened(path) as recording:
+        require_selected(recording, path, keys)
+        with new_folder(folder):
+            with closing(make_tables(folder)) as tables:
+                names, rows = _write_tables(recording, tables, keys)
+            videos = import_module(VIDEOS).write_videos(recording, folder, keys) if with_videos else []
     said = f"{folder}: {counted(names, 'table')} with {counted(rows, 'row')}"
     say(f"{said}, {counted(len(videos), 'video')}" if with_videos else said)
     return ExitCode.DONE

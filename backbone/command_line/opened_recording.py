@@ -7,8 +7,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from backbone.command_line.unusable_file import unreadable
+from backbone.errors import Refusal
 from backbone.operating_system.ending_signals import interruptible
+from backbone.recording.hearing import is_meant
 from backbone.recording.reader import NoRecording, Recording, open_file
+
+
+class NothingSelected(Refusal):
+    """A recording has no message with one of these keys."""
+
+    code = "recording.no_message"
+    remedy = "See 'scout-backbone recording keys FILE' for the keys of a recording."
 
 
 @contextmanager
@@ -29,3 +38,13 @@ def opened(path: Path) -> Iterator[Recording]:
         except NoRecording as error:
             raise type(error)(f"{path}: {error.detail}", remedy=error.remedy) from error
         yield recording
+
+
+def require_selected(recording: Recording, path: Path, keys: tuple[str, ...]) -> None:
+    """Return if no keys are given, or a message of the recording has one of them, else raise.
+
+    Raises:
+        NothingSelected: None has one.
+    """
+    if keys and not any(is_meant(one.key, keys) for one in recording.contents().counts):
+        raise NothingSelected(f"{path} has no message whose key matches {' or '.join(keys)}")

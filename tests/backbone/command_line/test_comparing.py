@@ -11,6 +11,7 @@ from small_recordings import SCOUT, Said, recorded
 
 from backbone.command_line import comparing
 from backbone.command_line.comparing import print_comparison
+from backbone.command_line.opened_recording import NothingSelected
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
@@ -72,6 +73,6 @@ async def test_keys_that_no_message_has_are_refused(tmp_path: Path) -> None:
     """Else a wrong word in a nightly comparison counts as equal."""
     night = tmp_path / "night.mcap"
     night.write_bytes(recorded([Said(1.0, SCOUT, Conversation.LOG, EVENT)]).getvalue())
-    with pytest.raises(comparing.NothingToCompare, match="matches \\*/redings"):
+    with pytest.raises(NothingSelected, match="matches \\*/redings"):
         await comparing.compare(night, night, ("*/redings",), {}, as_json=False)
     assert await comparing.compare(night, night, ("*/log",), {}, as_json=False) is ExitCode.DONE

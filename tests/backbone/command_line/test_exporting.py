@@ -14,6 +14,8 @@ from small_recordings import SCOUT, Said, recorded
 
 from backbone.command_line import exporting
 from backbone.command_line.exporting import ROWS_AT_ONCE, CsvTables, export
+from backbone.command_line.foxglove_copy import copy_for_foxglove
+from backbone.command_line.opened_recording import NothingSelected
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
 from backbone.rc_manager.messages import Connect
@@ -84,6 +86,16 @@ async def test_csv_files_hold_the_same_as_text(night: Path, tmp_path: Path) -> N
     assert (applied["at_s"], applied["commanded_by"], applied["values.forward_m_s"]) == ("3.000000", "watch", "0.25")
     [schedule] = rows_of(folder / "backbone_rc_manager_schedule_Schedule.csv")
     assert schedule["requests.0.arc"] == ARC
+
+
+async def test_keys_that_no_message_has_are_refused_and_nothing_is_made(night: Path, tmp_path: Path) -> None:
+    made, keys = tmp_path / "made", ("*/redings",)
+    with pytest.raises(NothingSelected, match=r"no message whose key matches \*/redings"):
+        await export(night, made, keys, CsvTables, with_videos=False)
+    with pytest.raises(NothingSelected):
+        await copy_for_foxglove(night, made, keys)
+    assert not made.exists()
+    assert await export(night, made, ("*/redings", "*/readings"), CsvTables, with_videos=False) is ExitCode.DONE
 
 
 async def test_keys_whose_parts_join_to_the_same_name_have_files_of_their_own(tmp_path: Path) -> None:
