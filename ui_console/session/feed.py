@@ -205,8 +205,11 @@ class ConsoleFeed:
                 self.unanswered.add(robot, reason, user)
                 unsure = f"{robot} did not confirm the stop, which this console repeats while it runs"
                 raise LinkError(f"{unsure}: {error}") from error
-            except (Refusal, asyncio.CancelledError):
+            except Refusal:
                 self.unanswered.answered(robot)
+                raise
+            except asyncio.CancelledError:
+                self.unanswered.gave_up(robot)
                 raise
             self.unanswered.answered(robot)
             self._hear(stop)

@@ -52,9 +52,14 @@ class UnansweredStops:
         self._news.set()
 
     def answered(self, robot: str) -> None:
-        """Send the robot no further stop: its RC answered one, or the console gave up the first."""
+        """Send the robot no further stop: its RC answered one."""
         self._stops.pop(robot, None)
         self._pending.discard(robot)
+
+    def gave_up(self, robot: str) -> None:
+        """Count the robot as stopped no longer, unless an earlier stop is being repeated."""
+        if robot not in self._stops:
+            self._pending.discard(robot)
 
     async def run(self) -> None:
         """Send what is not answered; until cancelled."""

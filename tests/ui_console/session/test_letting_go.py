@@ -350,6 +350,25 @@ def test_a_robot_that_does_not_answer_its_stop_gets_no_motion_from_the_console_t
     stage(scene)
 
 
+def test_a_second_stop_that_is_given_up_ends_no_repetition_of_the_first(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: HeldRobot) -> None:
+        away = on.placer.network.servers.pop("resource_pool/scout1")
+        assert not await on.console.stop_robot("scout1", "a child")
+        second = asyncio.create_task(on.console.feed.stop_robots(["scout1"], "a child"))
+        await on.clock.sleep_s(0.1)  # it is under way
+        assert not second.done()
+        second.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await second
+        assert "scout1" in on.console.feed.unanswered
+        on.placer.network.servers["resource_pool/scout1"] = away
+        await on.clock.sleep_s(3.0)
+        assert on.latch.state.is_stopped
+        assert "scout1" not in on.console.feed.unanswered
+
+    stage(scene)
+
+
 def test_a_script_moves_nothing_after_a_stop_of_its_own_robot_that_is_not_answered(
     scripted: Callable[[Scene], None],
 ) -> None:
