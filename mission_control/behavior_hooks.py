@@ -93,7 +93,7 @@ class BehaviorHooks:
 
         When: for each command of a new class during its trial (``scout-backbone swap``), because this class comes back
         if the trial fails; also for a command without an answer. What: record an effect that outlasts the command, such
-        as a jump. Not: send commands.
+        as a jump (``word_of`` returns the word of each command). Not: send commands.
         """
 
     def not_now(self) -> float:

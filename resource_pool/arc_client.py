@@ -115,6 +115,7 @@ __all__ = [
     "stop_robot",
     "watch_readings",
     "watch_stops",
+    "word_of",
 ]
 
 log = logging.getLogger(__name__)
@@ -387,3 +388,10 @@ def notice_arc(notice: ArcNotice) -> str:
 def arc_name(bus: Bus, kind: str) -> str:
     """Return the name of the owner's ARC of this kind: ``<owner>-<kind>``."""
     return f"{bus.source.rpartition('/')[2]}-{kind}"
+
+
+def word_of(asked: Message) -> str:
+    """Return the word of a command to an ARC, whether it is sent by its class or by its word; empty: it is none."""
+    if isinstance(asked, GiveCommand):
+        return asked.word
+    return asked.word() if isinstance(asked, Command) else ""

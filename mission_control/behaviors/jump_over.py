@@ -25,7 +25,7 @@ from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
 from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, JumpStage, Obstacle
 from mission_control.behaviors.motion import FARTHEST_M, Attempts, DrivingSpeed, Motion, NamedLocalizer, read_places
 from mission_control.messages import BehaviorStatus
-from resource_pool.arc_client import Jump
+from resource_pool.arc_client import Jump, word_of
 
 
 class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -91,7 +91,7 @@ class JumpOver(Driver[JumpOverParameters]):
 
     def robot_obeyed(self, command: Message) -> None:
         """Wait for the landing of a jump that another class commanded; see ``Behavior.robot_obeyed``."""
-        if isinstance(command, Jump):
+        if word_of(command) == Jump.word():
             self.course.jumped_already(self.clock.now_s())
 
     def interrupted(self) -> None:

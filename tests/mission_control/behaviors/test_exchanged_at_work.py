@@ -22,6 +22,7 @@ from mission_control.behaviors.pickup_route import PickupStage
 from mission_control.behaviors.return_to_pickup import ReturnToPickup
 from mission_control.behaviors.servo_to_target import ServoToTarget
 from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import word_of
 from resource_pool.commands import Jump
 
 OVER = {"localizer": "eye", "front": "5,0", "heading_deg": 0.0}
@@ -177,6 +178,36 @@ def test_the_class_that_comes_back_knows_of_a_jump_during_the_trial(
             await placer.wait(lambda: behavior.status is BehaviorStatus.SUCCESS, LANDED_AFTER_S + 2.0)
             after = [at_s for at_s, _epoch, _command in arc.commands if at_s > jumped_s[0]]
             assert min(after) >= jumped_s[0] + LANDED_AFTER_S - 0.1
+            assert behavior.payload == {"jumps": 1}
+
+    run_virtual(scene())
+
+
+def test_the_class_that_comes_back_knows_of_a_jump_that_was_commanded_by_its_word(
+    local_mission: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "jumps_by_word.py").write_text(
+        "from mission_control.behaviors.jump_over import JumpOver\n\n\n"
+        "class Again(JumpOver):\n"
+        "    async def drive_on(self, robot):\n"
+        "        await self.held.give('jump', {})\n"
+        "        raise ValueError('planted')\n"
+    )
+
+    async def scene() -> None:
+        async with stand(local_mission, JumpOver, **OVER) as (behavior, arc, eye, placer):
+            eye.at = RUN_UP
+            await arc.grant()
+            await placer.clock.sleep_s(1.0)
+            asked = SwapClass("jumps_by_word:Again", prove_s=30.0)
+            swapped = await placer.bus.ask(behavior.address, asked, Swapped, within_s=60.0)
+            assert "planted" in swapped.cause
+            [jumped_s] = [at_s for at_s, _epoch, command in arc.commands if word_of(command) == Jump.word()]
+            eye.at = BEYOND
+            await placer.wait(lambda: behavior.status is BehaviorStatus.SUCCESS, LANDED_AFTER_S + 2.0)
+            after = [at_s for at_s, _epoch, _command in arc.commands if at_s > jumped_s]
+            assert min(after) >= jumped_s + LANDED_AFTER_S - 0.1
             assert behavior.payload == {"jumps": 1}
 
     run_virtual(scene())
