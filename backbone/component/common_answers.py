@@ -130,16 +130,24 @@ class CommonAnswers:
         return Statistics({**common, **self._own_statistics(MOST_ENTRIES - len(common))})
 
     def _own_statistics(self, most: int) -> dict[str, float]:
-        """Return those that a message can hold, at most so many; the first time that one is left out, log it."""
-        own = self._component.statistics()
+        """Return those that a message can hold, at most so many; the first time that any is missing, log it."""
+        try:
+            own = dict(self._component.statistics())
+        except Exception as bug:  # people ask for them at any time, and no work of the component needs them
+            self._warn(f"its own statistics are missing: {complaint(bug)}")
+            return {}
         legal = dict(islice(((name, float(value)) for name, value in own.items() if is_measure(name, value)), most))
         left_out = next((name for name in own if name not in legal), None)
-        if left_out is not None and not self._has_warned:
-            self._has_warned = True
+        if left_out is not None:
             fits = f"at most {MOST_ENTRIES} finite numbers, with names of at most {LONGEST_MENTION} characters"
-            what = f"its statistics are without {left_out!r}, which is {own[left_out]!r}; they hold {fits}"
-            self._component.publish_event("statistics", what, LogLevel.WARNING)
+            self._warn(f"its statistics are without {left_out!r}, which is {own[left_out]!r}; they hold {fits}")
         return legal
+
+    def _warn(self, what: str) -> None:
+        """Publish a warning about the statistics, the first time."""
+        if not self._has_warned:
+            self._has_warned = True
+            self._component.publish_event("statistics", what, LogLevel.WARNING)
 
     def _set_parameter(self, name: str, value: object, user: str) -> Parameters:
         component, old = self._component, msgspec.to_builtins(self._component.parameters)

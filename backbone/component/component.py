@@ -167,7 +167,10 @@ class Component(Generic[P_co]):
         """
 
     def statistics(self) -> dict[str, float]:
-        """Return named counters and measures, units in the names. One that is no finite number is left out."""
+        """Return named counters and measures, units in the names.
+
+        One that is no finite number is left out; after an exception all are, and a warning in the log names it.
+        """
         return {}
 
     def absences(self) -> list[Absence]:

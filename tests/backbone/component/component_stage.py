@@ -95,6 +95,8 @@ class Walker(Component[Gait]):
         self.diary.append(f"step {self.parameters.step_s:g} s")
 
     def statistics(self) -> dict[str, float]:
+        if self.stumble == "statistics":
+            raise self.by or KeyError("statistics")
         return {"pokes": self.pokes, **self.odd}
 
     async def answer(self, asked: Envelope[Any]) -> Message:

@@ -136,6 +136,24 @@ def test_a_statistic_that_no_message_can_hold_does_not_hide_the_others(
     live(law())
 
 
+def test_a_bug_in_statistics_is_logged_once_and_ends_nothing() -> None:
+    async def law() -> None:
+        stage = Stage(stumble="statistics")
+        logged: list[str] = []
+        stage.tower.subscribe(WALKER, Conversation.LOG, StoryEvent, lambda event: logged.append(event.body.what))
+        life = await stage.begin()
+        for _again in range(2):
+            values = (await stage.ask(AskStatistics(), Statistics)).values
+            assert "bus_answered" in values
+        await stage.clock.sleep_s(0.1)
+        [event] = logged
+        assert event.startswith("its own statistics are missing: KeyError: 'statistics' (")
+        stage.walker.end("enough")
+        await life
+
+    live(law())
+
+
 def test_more_statistics_than_a_message_holds_are_cut() -> None:
     async def law() -> None:
         stage = Stage()
