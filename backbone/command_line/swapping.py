@@ -19,6 +19,7 @@ from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of, did_you_mean
+from backbone.picture.reasons import stopped_unit
 from backbone.placer.messages import ListPlacements, Placements
 from backbone.spoken import counted
 from backbone.wire import UnknownMessage
@@ -135,6 +136,8 @@ async def _unknown(bus: Bus, name: str, known: Iterable[str], up: Collection[str
     if name in placed.stopped:
         remedy = "Start it through its owner or by 'scout-backbone start', then swap again."
         return Silent(f"{name} is stopped: {placed.stopped[name]}", remedy=remedy)
+    if told := await stopped_unit(bus, name, placed.stopped):
+        return Silent(told, remedy="Start it, then swap again.")
     absent = {one.name: one.type for one in placed.placements if one.name not in up}
     if name in absent:
         return await _not_up(bus, f"{name} is not up", [name])

@@ -19,13 +19,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel, Stop, Stopping
-from backbone.creator.messages import (
-    READY_WITHIN_S,
-    ListProcesses,
-    ProcessEnded,
-    Processes,
-    ProcessFell,
-)
+from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnded, Processes, ProcessFell
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.awaited_hosts import announce_awaited_hosts, awaited_hosts
@@ -46,7 +40,7 @@ from backbone.launcher.hand_recorders import HandRecorderWatch
 from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch, ends_before
 from backbone.launcher.last_run import run_last
-from backbone.launcher.messages import AskDeclared, AskTree, DeclaredOrder, NotUpYet, TreeChange
+from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
@@ -59,7 +53,16 @@ from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.naming import Subsystem, address, component_of
 from backbone.picture.words import starts_line
-from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
+from backbone.placer.messages import (
+    AskDeclared,
+    DeclaredOrder,
+    Ended,
+    ListPlacements,
+    Placement,
+    Placements,
+    Start,
+    StopComponent,
+)
 from backbone.run_files import RunFolderRemoved
 from backbone.waiting import end_tasks, first_of
 from backbone.wire import Accepts, Envelope, Message

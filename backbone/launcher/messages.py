@@ -1,4 +1,4 @@
-"""Messages about a running mission as it is declared: its orders, and its behavior tree.
+"""Messages about the behavior tree of a running mission.
 
 They go to the launcher, which owns the tree, and from it to behaviors.
 """
@@ -8,25 +8,8 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from backbone.errors import Refusal
-from backbone.placer.messages import Start
 from backbone.ranges import MANY, Count, Document, Line, Mention, Text, Values
 from backbone.wire import Message
-
-
-class AskDeclared(Message, frozen=True):
-    """Ask for the order that starts a component as the mission declares it now."""
-
-    name: Mention
-
-
-class DeclaredOrder(Message, frozen=True):
-    """Answer to ``AskDeclared``.
-
-    Attributes:
-        order: The order; None: the mission declares no such component.
-    """
-
-    order: Start | None = None
 
 
 class AskTree(Message, frozen=True):

@@ -14,8 +14,7 @@ from backbone.bus.interface import Bus
 from backbone.component_database.messages import UnknownType
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import Refusal
-from backbone.launcher.messages import AskDeclared, DeclaredOrder
-from backbone.placer.messages import Start
+from backbone.placer.messages import AskDeclared, DeclaredOrder, Start
 
 REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 

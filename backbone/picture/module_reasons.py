@@ -9,6 +9,7 @@ from backbone.creator.messages import Spawn
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.module_waits import AwaitedInput, ModuleWaits
 from backbone.naming import component_of
+from backbone.placer.messages import Start
 from backbone.spoken import counted
 
 
@@ -26,7 +27,7 @@ def module_lines(name: str, unit: ComponentState, waits: ModuleWaits, there: Col
     return [first, *(f"  {one_of}it waits for {_awaited(one, there)}" for one in waits.awaited)]
 
 
-def modules_of(order: Spawn) -> list[str]:
+def modules_of(order: Spawn | Start) -> list[str]:
     """Return the names of the modules in the order that starts a unit; none for other components."""
     modules = order.parameters.get("modules") if order.type == EXECUTION_UNIT else None
     return [str(one.get("name")) for one in modules if isinstance(one, dict)] if isinstance(modules, list) else []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
@@ -24,7 +24,15 @@ from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
 from backbone.picture.module_reasons import module_lines, modules_of
 from backbone.picture.words import RULES, absence_line, stop_line
-from backbone.placer.messages import AskPlacement, NotPlaced, Placement
+from backbone.placer.messages import (
+    AskDeclared,
+    AskPlacement,
+    DeclaredOrder,
+    ListPlacements,
+    NotPlaced,
+    Placement,
+    Placements,
+)
 from backbone.printable import printable_all
 from backbone.rc_manager.messages import AskWhy
 from backbone.scheduling.requests import RequestState, UnknownRequest
@@ -196,7 +204,23 @@ async def _module_remarks(bus: Bus, name: str, picture: MissionPicture) -> list[
     for unit, why in silent.items():
         if unit in ordered and name in modules_of(ordered[unit]):
             return [f"{name} is a module of {unit}, which does not run it", f"  {why}"]
-    return []
+    placed = await _or_error(bus, PLACER, ListPlacements(), Placements)
+    stopped = await stopped_unit(bus, name, placed.stopped) if isinstance(placed, Placements) else ""
+    return [stopped] if stopped else []
+
+
+async def stopped_unit(bus: Bus, module: str, stopped: Mapping[str, str]) -> str:
+    """Return that the unit of this module was stopped, and how to start it; empty: none of these has the module.
+
+    Args:
+        stopped: Name of a component that was ordered to stop → reason.
+    """
+    answers = await asyncio.gather(*(_or_error(bus, LAUNCHER, AskDeclared(one), DeclaredOrder) for one in stopped))
+    for unit, answer in zip(stopped, answers, strict=True):
+        if isinstance(answer, DeclaredOrder) and answer.order is not None and module in modules_of(answer.order):
+            start = f"scout-backbone start {EXECUTION_UNIT} --name {unit}"
+            return f"{module} is a module of {unit}, which was stopped, {stopped[unit]}; start it by '{start}'"
+    return ""
 
 
 def host_remarks(name: str, picture: MissionPicture) -> list[str]:

@@ -114,6 +114,25 @@ class Placements(Message, frozen=True):
     stopped: Annotated[dict[Mention, Text], MANY] = {}
 
 
+# Anyone → the launcher, which has the orders of the mission file.
+
+
+class AskDeclared(Message, frozen=True):
+    """Ask for the order that starts a component as the mission declares it now."""
+
+    name: Mention
+
+
+class DeclaredOrder(Message, frozen=True):
+    """Answer to ``AskDeclared``.
+
+    Attributes:
+        order: The order; None: the mission declares no such component.
+    """
+
+    order: Start | None = None
+
+
 class NoHost(Refusal):
     """No host is possible for the component; the detail gives the reason of each host."""
 

@@ -15,11 +15,10 @@ from backbone.command_line.ordering import running_otherwise
 from backbone.component.messages import ComponentState, LifeState
 from backbone.component_database.messages import UnknownType
 from backbone.dependency_database.messages import AskResources, Resource, Resources
-from backbone.launcher.messages import AskDeclared, DeclaredOrder
 from backbone.launcher.start_by_hand import named_in_place_of_its_type
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.picture.reasons import reasons_for
-from backbone.placer.messages import AskPlacement, NotPlaced, Start
+from backbone.placer.messages import AskDeclared, AskPlacement, DeclaredOrder, NotPlaced, Start
 from backbone.placer.placement_book import PlacementBook
 from backbone.wire import Envelope
 

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from backbone.addresses import NAMESERVER, PLACER
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.command_line.swapping import addressed
@@ -24,7 +24,7 @@ from backbone.errors import Refusal
 from backbone.exchange import Silent, SwapModule, UnknownModule
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.placer.messages import ListPlacements, Placement, Placements
+from backbone.placer.messages import AskDeclared, DeclaredOrder, ListPlacements, Placement, Placements, Start
 from backbone.wire import Envelope, Message
 
 
@@ -56,6 +56,27 @@ def test_what_is_being_started_again_is_not_called_unknown(
         with pytest.raises(refused) as caught:
             await addressed(bus, SwapModule("smoothing", "pair:Smoothing"))
         assert re.search(told, str(caught.value))
+        await bus.close()
+
+    run_virtual(scene())
+
+
+def test_a_module_of_a_stopped_unit_is_refused_with_the_stop() -> None:
+    async def answer(asked: Envelope[Message]) -> Message:
+        match asked.body:
+            case ListComponents():
+                return Components([], complete=True, hub_since_s=0.0)
+            case ListPlacements():
+                return Placements([], {"waves": "by ann"})
+            case _:
+                return DeclaredOrder(Start(EXECUTION_UNIT, "waves", {"modules": [{"name": "smoothing"}]}))
+
+    async def scene() -> None:
+        bus = LocalNetwork("m").join(NAMESERVER, VirtualClock())
+        for served, questions in ((NAMESERVER, ListComponents), (PLACER, ListPlacements), (LAUNCHER, AskDeclared)):
+            bus.serve(served, questions, answer)
+        with pytest.raises(Silent, match="a module of waves, which was stopped, by ann; start it by"):
+            await addressed(bus, SwapModule("smoothing", "pair:Smoothing"))
         await bus.close()
 
     run_virtual(scene())

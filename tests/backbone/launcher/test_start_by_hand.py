@@ -11,9 +11,8 @@ from backbone.addresses import DEPENDENCY_DATABASE, LAUNCHER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.dependency_database.messages import AskResources, Resource, Resources
-from backbone.launcher.messages import AskDeclared, DeclaredOrder
 from backbone.launcher.start_by_hand import OtherType, complete, completed
-from backbone.placer.messages import Start
+from backbone.placer.messages import AskDeclared, DeclaredOrder, Start
 from backbone.wire import Envelope
 
 DAY = Start("surveillance", "day", {"path": [["m", 10], ["day", 3]], "children": []}, host="base")

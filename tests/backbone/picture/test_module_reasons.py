@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from backbone.addresses import LAUNCHER, NAMESERVER
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import ComponentState, LifeState
@@ -19,6 +19,8 @@ from backbone.nameserver.messages import Components, ListComponents, Resolve, Un
 from backbone.naming import Subsystem
 from backbone.picture.module_reasons import module_lines
 from backbone.picture.reasons import reasons_for
+from backbone.placer.messages import AskDeclared, DeclaredOrder, ListPlacements, Placements, Start
+from backbone.wire import Accepts
 
 GRABBER = ComponentState("resource_pool/grabber", "framegrabber", "base", 8, LifeState.READY, 1.0)
 HEARING = Spawn(
@@ -77,6 +79,11 @@ def why(name: str) -> list[str]:
                 return Processes("base", [], [ProcessState(HEARING, 0, 3, "killed by SIGKILL")])
             case AskModule("tracking"):
                 return ModuleWaits(0, [PICTURE], needs_all=True)
+            case ListPlacements():
+                return Placements([], {"hearing": "by ann", "smelling": "by ann"})
+            case AskDeclared(name=stopped):
+                order = Start(EXECUTION_UNIT, stopped, {"modules": [{"name": f"nose-of-{stopped}"}]})
+                return DeclaredOrder(order if stopped == "smelling" else None)
             case AskModule(module):
                 raise UnknownModule(f"vision has no module {module!r}")
             case _:
@@ -84,7 +91,8 @@ def why(name: str) -> list[str]:
 
     async def main() -> list[str]:
         network, clock = LocalNetwork("m"), VirtualClock()
-        serves = {NAMESERVER: ListComponents | Resolve, LAUNCHER: ListProcesses, UNIT.address: AskModule}
+        serves: dict[str, Accepts] = {NAMESERVER: ListComponents | Resolve, LAUNCHER: ListProcesses | AskDeclared}
+        serves |= {PLACER: ListPlacements, UNIT.address: AskModule}
         for address, accepts in serves.items():
             network.join(address, clock).serve(address, accepts, answer)
         return (await reasons_for(network.join("ui_console/asker", clock), name, clock)).lines(5.0)
@@ -103,6 +111,13 @@ def test_a_module_of_a_fallen_unit_is_explained_by_its_fall() -> None:
     first, second = why("of-hearing")
     assert first == "of-hearing is a module of hearing, which does not run it"
     assert second.startswith("  hearing is absent for ")
+
+
+def test_a_module_of_a_stopped_unit_is_explained_by_the_stop() -> None:
+    start = "scout-backbone start execution_unit --name smelling"
+    assert why("nose-of-smelling") == [
+        f"nose-of-smelling is a module of smelling, which was stopped, by ann; start it by '{start}'"
+    ]
 
 
 def test_a_name_that_is_no_module_stays_unknown() -> None:
