@@ -29,6 +29,13 @@ class Silent(Refusal):
     remedy = "Run 'scout-backbone status'. The creator replaces a process that hangs; swap again afterwards."
 
 
+class UnknownExchange(Refusal):
+    """The component has begun no exchange of this id."""
+
+    code = "exchange.unknown_id"
+    remedy = "See 'scout-backbone log' for its end, and swap again if the old class is back."
+
+
 class ExchangeRunning(Refusal):
     """An exchange in this component is not over yet."""
 
@@ -53,6 +60,8 @@ class SwapModule(Message, frozen=True):
         ready_within_s: Mission time after which a new module that is not ready is dropped.
         silent_s: If an output of the old module is missing for this mission time, the old module comes back.
         user: The person who asks.
+        exchange_id: Id of this request, unique in the component; empty: it is not repeated.
+        is_repeated: True: its answer was lost, so return the answer, and begin no other exchange.
     """
 
     module: Mention
@@ -62,6 +71,8 @@ class SwapModule(Message, frozen=True):
     ready_within_s: Duration = READY_WITHIN_S
     silent_s: Duration = SILENT_S
     user: Mention = ""
+    exchange_id: Mention = ""
+    is_repeated: bool = False
 
 
 class SwapClass(Message, frozen=True):
@@ -78,6 +89,8 @@ class SwapClass(Message, frozen=True):
     prove_s: Duration = PROVE_S
     ready_within_s: Duration = READY_WITHIN_S
     user: Mention = ""
+    exchange_id: Mention = ""
+    is_repeated: bool = False
 
 
 class Swapped(Message, frozen=True):

@@ -24,6 +24,7 @@ import msgspec
 from backbone.component.log_level import LogLevel
 from backbone.errors import LinkError, Refusal, complaint
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
+from backbone.exchange_answers import ExchangeAnswers
 from backbone.exchange_course import (
     ExchangeCourse,
     ExchangePhase,
@@ -77,6 +78,7 @@ class BehaviorExchanges:
         self._is_busy = False
         self._news = asyncio.Event()
         self._copying: set[asyncio.Task[None]] = set()
+        self._answers = ExchangeAnswers()
 
     async def run(self, life: Coroutine[object, None, None]) -> None:
         """Run until the implementation in charge has ended; raise the bug that ended it."""
@@ -179,7 +181,11 @@ class BehaviorExchanges:
             WrongClass: The class cannot be imported or created, or is not a suitable behavior.
             WrongParameter: The class has no such parameters.
             ValuesChanged: The new file declares classes of values differently.
+            UnknownExchange: The request is repeated, and this process did not get it before.
         """
+        return await self._answers.answer(asked, lambda: self._swap_one(asked))
+
+    async def _swap_one(self, asked: SwapClass) -> Swapped:
         if self._is_busy:
             raise ExchangeRunning(f"{self.present.launch.name} is being exchanged")
         self._is_busy = True

@@ -25,6 +25,7 @@ from backbone.component.log_level import LogLevel
 from backbone.component.messages import WrongParameter
 from backbone.errors import Refusal, complaint
 from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
+from backbone.exchange_answers import ExchangeAnswers
 from backbone.exchange_course import (
     UNPROVED,
     ExchangeCourse,
@@ -107,6 +108,7 @@ class DriverExchanges:
         self._going: _DriverExchange | None = None
         self._is_busy = False
         self._news = asyncio.Event()
+        self._answers = ExchangeAnswers()
 
     def made(self, build: Callable[[DriverSite], object], site: DriverSite) -> object:
         """Return a driver whose spontaneous failures count as failures of this driver."""
@@ -154,7 +156,11 @@ class DriverExchanges:
             WrongClass: The class cannot be imported or created, or is not a driver of this kind.
             WrongParameter: The driver refuses its options.
             ValuesChanged: The new file declares classes of values differently.
+            UnknownExchange: The request is repeated, and this process did not get it before.
         """
+        return await self._answers.answer(asked, lambda: self._swap_one(asked, slots))
+
+    async def _swap_one(self, asked: SwapClass, slots: Sequence[DriverSlot]) -> Swapped:
         if self._is_busy:
             remedy = "Wait until it is over; 'scout-backbone log' shows it."
             raise ExchangeRunning(f"the driver of {self._rc.name} is being exchanged", remedy=remedy)

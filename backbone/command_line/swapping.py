@@ -4,16 +4,28 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Collection, Iterable
+from uuid import uuid4
+
+import msgspec
 
 from backbone.addresses import NAMESERVER, PLACER
-from backbone.bus.interface import Bus
+from backbone.bus.interface import Bus, Clock
 from backbone.command_line.connection import REPLY_TIME_S, connected
 from backbone.command_line.unit_modules import modules_by_unit
 from backbone.command_line.where import Where
+from backbone.component.asking import ask_until_answered
 from backbone.component.messages import Absence, AskState, AskTime, ComponentState, MissionTime
 from backbone.creator.messages import creator_name
-from backbone.errors import LinkError, OutcomeUnknown, Refusal
-from backbone.exchange import NotExchanged, Silent, SwapClass, SwapModule, Swapped, UnknownModule
+from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
+from backbone.exchange import (
+    NotExchanged,
+    Silent,
+    SwapClass,
+    SwapModule,
+    Swapped,
+    UnknownExchange,
+    UnknownModule,
+)
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.operators import OperatorAction, publish_action
@@ -24,6 +36,7 @@ from backbone.placer.messages import ListPlacements, Placements
 from backbone.spoken import counted
 from backbone.wire import UnknownMessage
 
+AGAIN_WITHIN_S = 20.0  # chosen: a hub that hangs is replaced within 4 s, and a process within its restart delays
 READ_WITHIN_S = 60.0  # chosen: an import of a large library on a busy machine, and the answer
 
 
@@ -41,7 +54,7 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
         publish_action(bus, clock, OperatorAction.SWAP, asked.module, f"for {asked.class_path}")
         within_s = (asked.ready_within_s + asked.prove_s) / clock.rate + READ_WITHIN_S
         try:
-            swapped = await bus.ask(at, question, Swapped, within_s=within_s)
+            swapped = await swapped_by(bus, clock, at, question, within_s)
         except UnknownMessage:
             raise NotExchanged(
                 f"{asked.module} is no module, behavior or resource", remedy="See 'scout-backbone status' for these."
@@ -49,14 +62,31 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
         except asyncio.CancelledError:
             say(f"the exchange goes on without this command; 'scout-backbone log --text {asked.module}' shows its end")
             raise
-        except LinkError as error:
-            told = f"{component_of(at)} ended, hung or was cut off while it exchanged {asked.module}: {error}"
+        except (LinkError, UnknownExchange) as error:
+            cause = error.detail if isinstance(error, Refusal) else error
+            told = f"{component_of(at)} ended, hung or was cut off while it exchanged {asked.module}: {cause}"
             raise OutcomeUnknown(told, remedy=f"See 'scout-backbone why {component_of(at)}', and 'log'.") from error
     counts = "round" if question is asked else "command" if at.startswith(f"{Subsystem.MISSION_CONTROL}/") else "call"
     show([_told(asked, swapped, counts)])
     if swapped.remark:
         say(swapped.remark)
     return ExitCode.DONE if swapped.is_proved else ExitCode.REFUSED
+
+
+async def swapped_by(bus: Bus, clock: Clock, at: str, question: SwapModule | SwapClass, within_s: float) -> Swapped:
+    """Return the answer; if the link breaks before it arrives, ask for it again.
+
+    Raises:
+        UnknownExchange: The component was started again meanwhile.
+        LinkError: It does not answer.
+    """
+    question = msgspec.structs.replace(question, exchange_id=uuid4().hex)
+    try:
+        return await bus.ask(at, question, Swapped, within_s=within_s)
+    except NoResponder as broken:
+        say(f"waiting for {component_of(at)}, which ended or was cut off: {broken}")
+        again = msgspec.structs.replace(question, is_repeated=True)
+        return await ask_until_answered(bus, clock, at, again, Swapped, each_s=within_s, within_s=AGAIN_WITHIN_S)
 
 
 def _told(asked: SwapModule, swapped: Swapped, counts: str) -> str:

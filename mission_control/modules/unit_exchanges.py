@@ -14,6 +14,7 @@ from backbone.component.component import Component
 from backbone.component.log_level import LogLevel
 from backbone.errors import Refusal, complaint
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
+from backbone.exchange_answers import ExchangeAnswers
 from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, remark_on_file
 from backbone.keys import Conversation
 from backbone.naming import did_you_mean
@@ -75,6 +76,7 @@ class UnitExchanges:
         for one in component.parameters.modules:
             self._kinds |= kinds_made(modules[one.name], one.member(modules[one.name]))
         self._running = ""
+        self._answers = ExchangeAnswers()
 
     async def swap(self, asked: SwapModule) -> Swapped:
         """Exchange the module; return when the new one has passed its trial, or the old one is back.
@@ -85,7 +87,11 @@ class UnitExchanges:
             WrongModule: The class cannot be imported or created.
             ValuesChanged: The new file declares classes of values differently.
             GraphRefused: The module has other ports; the error lists all faults.
+            UnknownExchange: The request is repeated, and this process did not get it before.
         """
+        return await self._answers.answer(asked, lambda: self._swap_one(asked))
+
+    async def _swap_one(self, asked: SwapModule) -> Swapped:
         if asked.module not in self._modules:
             meant = did_you_mean(asked.module, self._modules)
             raise UnknownModule(f"{self._component.name} has no module {asked.module!r}{meant}")
