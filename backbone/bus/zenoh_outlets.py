@@ -23,19 +23,22 @@ KNOWN_AFTER_S = 1.0  # chosen: a new publisher knows its subscribers by then; it
 
 Receiver = Callable[[bytes], None]
 
-_URGENCY = {
-    Urgency.URGENT: zenoh.Priority.REAL_TIME,
-    Urgency.NORMAL: zenoh.Priority.DATA,
-    Urgency.LOW: zenoh.Priority.DATA_LOW,
-    Urgency.LOWEST: zenoh.Priority.BACKGROUND,
+_PRIORITIES = {
+    Urgency.URGENT: (zenoh.Priority.REAL_TIME, zenoh.Priority.INTERACTIVE_HIGH),
+    Urgency.NORMAL: (zenoh.Priority.DATA_HIGH, zenoh.Priority.DATA),
+    Urgency.LOW: (zenoh.Priority.DATA_LOW, zenoh.Priority.DATA_LOW),
+    Urgency.LOWEST: (zenoh.Priority.BACKGROUND, zenoh.Priority.BACKGROUND),
 }
+"""Urgency → priority of reliable messages, and of others: in one queue, a status would wait behind outputs that fill
+it, and block its sender while the hub hangs."""
 
 
 def on_the_wire(quality: Quality) -> dict[str, Any]:
     """Return a quality as settings of zenoh, for a publisher or a single publication."""
     control = zenoh.CongestionControl
+    reliable, best_effort = _PRIORITIES[quality.urgency]
     return {
-        "priority": _URGENCY[quality.urgency],
+        "priority": reliable if quality.reliable else best_effort,
         "congestion_control": control.BLOCK if quality.reliable else control.DROP,
         "express": quality.express,
     }

@@ -12,6 +12,7 @@ from mission_control.modules.module import Module
 from mission_control.modules.unit_component import UnitComponent
 
 EVENT_BYTES, EVENTS_HZ = 20_000, 20.0  # fills a socket within half a second
+PICTURE_BYTES, REPORTS_HZ = 15_000, 5.0
 
 
 class Reading(Message, frozen=True):
@@ -59,6 +60,16 @@ class Actuator(Module):
         return self.Outputs(inputs.reading)
 
 
+class Camera(Module):
+    """Makes pictures that are too small for a board."""
+
+    class Outputs(Module.Outputs):
+        picture: Much
+
+    def update(self, inputs: Module.Inputs) -> Outputs:
+        return self.Outputs(Much(memoryview(bytes(PICTURE_BYTES))))
+
+
 class QuietUnit(UnitComponent):
     registers = False
 
@@ -75,3 +86,17 @@ class UnitBesideTalk(QuietUnit):
         while True:
             self.bus.publish(self.address, Conversation.EVENTS, Much(data))
             await self.clock.sleep_s(1 / EVENTS_HZ)
+
+
+class UnitOfPictures(QuietUnit):
+    """Its pictures fill a queue, and meanwhile it sends states, which must not be lost."""
+
+    async def connect(self) -> None:
+        await super().connect()
+        self.start_task(self._report_on(), "report on")
+
+    async def _report_on(self) -> None:
+        number = 0
+        while True:
+            self.report(f"report {(number := number + 1)}")
+            await self.clock.sleep_s(1 / REPORTS_HZ)

@@ -23,7 +23,7 @@ from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
-from backbone.component.messages import AskStatistics, Statistics
+from backbone.component.messages import AskStatistics, ComponentState, Statistics
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from mission_control.modules.arrangement import UnitOrder, arranged
@@ -87,6 +87,7 @@ def robot(endpoint: str, folder: Path, kind: str) -> Iterator[Robot]:
         modules=[
             ModuleOrder("sensor", "lonely_unit:Sensor"),
             ModuleOrder("actuator", "lonely_unit:Actuator", {"path": str(file)}),
+            *([ModuleOrder("camera", "lonely_unit:Camera")] if kind == "UnitOfPictures" else []),
         ],
     )
     launch = Launch(
@@ -140,7 +141,7 @@ def crowd(endpoint: str) -> Iterator[None]:
             process.kill()
 
 
-@pytest.mark.parametrize("kind", ["QuietUnit", "UnitBesideTalk"])
+@pytest.mark.parametrize("kind", ["QuietUnit", "UnitBesideTalk", "UnitOfPictures"])
 def test_a_unit_goes_on_while_its_hub_hangs_and_when_it_is_dead_and_joins_again(kind: str, short_path: Path) -> None:
     endpoint = socket_endpoint(short_path)
     with hub(endpoint) as first, crowd(endpoint), robot(endpoint, short_path, kind) as one:
@@ -165,7 +166,9 @@ def test_a_unit_goes_on_while_its_hub_hangs_and_when_it_is_dead_and_joins_again(
 async def listen(endpoint: str) -> None:
     bus = await ZenohBus.open_when_up(MISSION, "ui_console/crowd", MissionClock.started_now(), client_config(endpoint))
     bus.subscribe(f"{ROBOT}/done", Conversation.OUTPUTS, Reading, lambda _one: None)
+    bus.subscribe(f"{ROBOT}/picture", Conversation.OUTPUTS, Much, lambda _one: None)
     bus.subscribe(ROBOT, Conversation.EVENTS, Much, lambda _one: None)
+    bus.subscribe(ROBOT, Conversation.STATUS, ComponentState, lambda _one: None)
     print("ready", flush=True)
     await asyncio.Event().wait()
 
