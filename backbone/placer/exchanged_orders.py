@@ -1,7 +1,8 @@
 """Orders of components whose class was exchanged at run time. Pure.
 
 Rule: a creator restarts an exchanged component with its new class. A component that is placed anew has the class and
-parameters of the mission file, because other hosts may not have the new class, and creators start no other classes.
+parameters of the mission file, because other hosts may not have the new class, and creators start no other classes. An
+exchanged module or driver is a parameter of a class that stays, so it is kept then, too.
 """
 
 from __future__ import annotations
