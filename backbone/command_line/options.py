@@ -111,13 +111,17 @@ def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
         parameter.process_value = partial(_processed, parameter, parameter.process_value)
 
 
-def _processed(parameter: Any, process_value: Callable[[Any, Any], Any], ctx: Any, value: object) -> Any:
+def _processed(parameter: Any, process_value: Callable[[Any, Any], Any], ctx: Any, value: Any) -> Any:
     """Return the value for the command; an absent optional value, or a value during completion, stays unchanged."""
     if (value is None and not parameter.required) or ctx.resilient_parsing:
         return value
     given = process_value(ctx, value)
-    if isinstance(given, float) and not math.isfinite(given):  # no range refuses NaN, and some have no upper end
-        raise typer.BadParameter(f"{given} is no finite number; see the range in --help", ctx, parameter)
+    several = isinstance(given, list | tuple)
+    for typed, read in zip(value, given, strict=True) if several else [(value, given)]:
+        if isinstance(read, float) and not math.isfinite(read):  # no range refuses NaN, and some have no upper end
+            raise typer.BadParameter(f"{read} is no finite number; see the range in --help", ctx, parameter)
+        if isinstance(typed, str) and isinstance(read, int | float) and ("_" in typed or not typed.isascii()):
+            raise typer.BadParameter(f"{typed} is no number; write it in digits 0 to 9", ctx, parameter)
     return given
 
 

@@ -33,6 +33,8 @@ def complaint_of(
         ("watch --most 1.5", "--most: '1.5' is no whole number (See 'scout-backbone watch --help'.)"),
         ("top --for x", "--for: 'x' is no number (See 'scout-backbone top --help'.)"),
         ("record --split 0", "--split: 0.0 is not between 1.0 and 1000000.0 (See 'scout-backbone record --help'.)"),
+        ("top --for 1_0", "--for: 1_0 is no number; write it in digits 0 to 9 (See 'scout-backbone top --help'.)"),
+        ("watch --most ٢", "--most: ٢ is no number; write it in digits 0 to 9 (See 'scout-backbone watch --help'.)"),
         ("recording info", "FILE.mcap is missing (See 'scout-backbone recording info --help'.)"),
         ("recording info a b", "too many arguments: b (See 'scout-backbone recording info --help'.)"),
         ("recording bogus", "there is no command bogus (See 'scout-backbone recording --help'.)"),
