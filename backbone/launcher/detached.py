@@ -153,7 +153,7 @@ async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool)
             say(ending.told)
         if ending.within_s:
             await first_of(_tell_last_branch(bus, ending.within_s / clock.rate + ASKED_S), ended.wait())
-        return await _needed(bus, ended)
+        return await _needed(bus, ended) if ending.has_components else "asking was enough"
     except LinkError as error:
         say(f"the launcher does not answer: {error}")
         return ""

@@ -25,10 +25,12 @@ class MissionEnding(Message, frozen=True):
     Attributes:
         told: State of the last branch, or what the end waits for, one line; empty: neither.
         within_s: Longest run of the branch, mission seconds; 0: it does not run.
+        has_components: False: no component runs, as in a replay; no further question is answered.
     """
 
     told: Text = ""
     within_s: Duration = 0.0
+    has_components: bool = True
 
 
 class AwaitLastBranch(Message, frozen=True):

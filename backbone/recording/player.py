@@ -203,7 +203,7 @@ class Player:
     async def _answer(self, address: str, asked: Envelope[Message]) -> Message:
         if isinstance(asked.body, EndMission) and address == LAUNCHER:
             self.ends()
-            return MissionEnding("", 0.0)
+            return MissionEnding(has_components=False)
         self._take_all()
         if self._next_step is None:
             self._mission.now_s = max(self._mission.now_s, self._clock.now_s())

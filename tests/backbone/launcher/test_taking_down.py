@@ -82,12 +82,13 @@ ACCOUNTS = [
     (MissionEnded([]), "asking was enough"),
     (MissionEnded([KILLED]), "needed a signal to end: spin (sigkill)"),
     (NoResponder("it fell"), "it is unknown whether its components needed a signal"),
+    (MissionEnding(has_components=False), "asking was enough"),
 ]
 
 
 @pytest.mark.parametrize(("account", "words"), ACCOUNTS)
 def test_the_last_line_says_what_the_components_needed(
-    account: MissionEnded | NoResponder,
+    account: MissionEnded | MissionEnding | NoResponder,
     words: str,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -104,7 +105,7 @@ def test_the_last_line_says_what_the_components_needed(
             def publish(self, *_given: Any) -> None: ...
 
             async def ask(self, _address: str, question: Message, *_given: Any, **_by_name: Any) -> Message:
-                if isinstance(question, EndMission):
+                if isinstance(question, EndMission) and not isinstance(account, MissionEnding):
                     return MissionEnding()
                 launcher.terminate()
                 if isinstance(account, NoResponder):

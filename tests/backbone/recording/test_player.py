@@ -285,7 +285,7 @@ def test_a_console_may_register_and_a_person_may_end_it():
     async def scene(bus: LocalBus, _clock: VirtualClock, player: Player) -> None:
         player.ends = lambda: ended.append(True)
         assert await bus.ask(NAMESERVER, Register(state("")), Registered, within_s=1.0) == Registered()
-        assert await bus.ask(LAUNCHER, EndMission(), MissionEnding, within_s=1.0) == MissionEnding()
+        assert await bus.ask(LAUNCHER, EndMission(), MissionEnding, within_s=1.0) == MissionEnding(has_components=False)
 
     played(recording_of(*MORNING), scene)
     assert ended == [True]
