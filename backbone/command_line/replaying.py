@@ -26,7 +26,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.command_line.comparing import print_comparison
 from backbone.command_line.message_lines import message_line
-from backbone.command_line.opened_recording import opened
+from backbone.command_line.opened_recording import opened, require_selected
 from backbone.component.class_path import load_class
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
@@ -147,6 +147,7 @@ class Playing:
 async def play(path: Path, wanted: Playing) -> ExitCode:
     """Play a recording as a mission that is up, until a person ends it."""
     with opened(path) as recording:
+        require_selected(recording, path, wanted.keys)
         found = recording.contents()
         name = legal(wanted.mission or f"{REPLAY}-{found.about.get('mission', '')}".strip("-")[:MAX_NAME_LENGTH])
         refuse_if_up(name)

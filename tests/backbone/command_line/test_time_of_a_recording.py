@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from small_recordings import SCOUT, Said, recorded
 
+from backbone.command_line.opened_recording import NothingSelected
 from backbone.command_line.recording_work import print_messages
 from backbone.command_line.replaying import Playing, decide_anew, play, print_reasons_at
 from backbone.component.messages import ComponentState, LifeState
@@ -66,3 +67,8 @@ async def test_what_is_left_out_is_said(night: Path, capsys: pytest.CaptureFixtu
         await print_messages(night, (), 0.0, None, most, as_json=False)
         shown = capsys.readouterr()
         assert (len(shown.out.splitlines()), shown.err) == (most, says)
+
+
+async def test_keys_that_no_message_has_are_not_played(night: Path) -> None:
+    with pytest.raises(NothingSelected, match=r"no message whose key matches \*/redings"):
+        await play(night, Playing("quiet", None, 1.0, is_stepped=False, keys=("*/redings",)))
