@@ -7,6 +7,7 @@ decisions can also be compared with those of today's release, or of other rules.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -117,14 +118,29 @@ def schedule_at(recording: Recording, at_s: float, reviver: Reviver | None = Non
         NotRecorded: The recording has no earlier snapshot, or a decision after the snapshot is missing.
     """
     schedule, reviver = RecordedSchedule(), reviver or Reviver()
-    for message in _in_order(recording.messages(_DECISIONS, 0.0, at_s, RC_MANAGER)):
-        match reviver.revived(message, Decided, ScheduleSnapshot):
-            case Decided() | ScheduleSnapshot() as told:
-                schedule.take(told, message)
+    for message, told in _since_last_snapshot(recording, at_s, reviver):
+        schedule.take(told, message)
     reviver.unread += schedule.unread
     if schedule.manager is None:
         raise NotRecorded(f"{schedule.lacks}, asked for {at_s:.3f} s")
     return schedule.manager
+
+
+def _since_last_snapshot(
+    recording: Recording, at_s: float, reviver: Reviver
+) -> list[tuple[Recorded, Decided | ScheduleSnapshot]]:
+    """Return the last snapshot before this mission time, and all decisions after it, in the order of their numbers."""
+    found, snapshot_s = list[tuple[Recorded, Decided | ScheduleSnapshot]](), -math.inf
+    for message in recording.messages(_DECISIONS, 0.0, at_s, RC_MANAGER, newest_first=True):
+        if message.at_s < snapshot_s:
+            break  # messages of the same time may stand in any order
+        match reviver.revived(message, Decided, ScheduleSnapshot):
+            case Decided() as decided:
+                found.append((message, decided))
+            case ScheduleSnapshot() as state:
+                found.append((message, state))
+                snapshot_s = message.at_s
+    return sorted(found, key=lambda one: (one[0].at_s, one[0].sequence))
 
 
 @dataclass(frozen=True, slots=True)

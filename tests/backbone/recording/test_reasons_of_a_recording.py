@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
 from small_recordings import SCOUT, Said, recorded
 
-from backbone.addresses import NAMESERVER
+from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.component.messages import ComponentState, LifeState
 from backbone.keys import Conversation
+from backbone.rc_manager.messages import Decided, ScheduleSnapshot
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
 from backbone.recording.reasons import reasons_at
+from backbone.scheduling.events import Woken
+from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.snapshot import written
 
 DRIVES = "scout1 is ready on base: drives"
 KILLED_S, BACK_S = 3.0, 5.0
@@ -98,3 +106,35 @@ def test_a_component_that_does_not_return_with_the_hub_has_left():
     hub = [token(at_s, NAMESERVER, alive=alive) for at_s, alive in ((1.0, True), (4.001, False), (4.3, True))]
     said = [*hub, state(), token(4.0, SCOUT, alive=False)]
     assert reasons_at(Recording(recorded(said)), "scout1", 9.0).lines(9.0) == [OWN_LEFT]
+
+
+class CountedRecording(Recording):
+    """A recording that counts the messages that are read.
+
+    Attributes:
+        read: Their number.
+    """
+
+    read = 0
+
+    def records(self, *given: Any, **named: Any) -> Iterator[Any]:
+        for one in super().records(*given, **named):
+            self.read += 1
+            yield one
+
+
+def test_late_reasons_need_only_the_messages_since_the_last_snapshot():
+    empty = written(ScheduleManager(SchedulingRules(), tolerance_s=0.01, mission="night", mission_priority=10))
+    said = [state()]
+    for number in range(1, 1001):
+        if number % 10 == 0:
+            snapshot = ScheduleSnapshot(number, 1.0 + number, empty)
+            said.append(Said(1.0 + number, RC_MANAGER, Conversation.ASK, snapshot, RC_MANAGER))
+        else:
+            decided = Decided(number, 1.0 + number, Woken())
+            said.append(Said(1.0 + number, RC_MANAGER, Conversation.DECISIONS, decided, RC_MANAGER))
+            said.append(Said(1.0 + number, "resource_pool/scout2", Conversation.ALIVE, Presence(True), ""))
+            said.append(state()._replace(at_s=1.0 + number))
+    recording = CountedRecording(recorded(said))
+    assert reasons_at(recording, "scout1", 996.0).lines(996.0) == [DRIVES]
+    assert recording.read < 10
