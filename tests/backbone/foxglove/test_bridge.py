@@ -151,3 +151,17 @@ async def test_bytes_that_are_no_message_are_not_shown_and_unknown_ones_have_no_
         await viewer.subscribe("/resource_pool/watch-capture/frames/Frame")
         await viewer.data()
         assert [channel["schema"] for channel in viewer.channels.values()] == [""]
+
+
+async def test_a_viewer_that_subscribes_again_and_again_sends_nothing_to_the_others(bridge: Bridge) -> None:
+    topic = "/resource_pool/scout1/readings/Readings"
+    hear(bridge, READINGS, Readings("scout1", 1.0, {"battery_share": 0.5}), 1.0)
+    async with viewing(bridge.port) as calm, viewing(bridge.port) as restless:
+        await calm.subscribe(topic)
+        assert (await calm.data())[0] == 1.0
+        for _time in range(3):
+            await restless.subscribe(topic)
+            assert (await restless.data())[0] == 1.0
+            await restless.say({"op": "unsubscribe", "subscriptionIds": [restless.channels[topic]["id"]]})
+        hear(bridge, READINGS, Readings("scout1", 2.0, {"battery_share": 0.25}), 2.0)
+        assert (await calm.data())[0] == 2.0
