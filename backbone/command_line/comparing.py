@@ -8,7 +8,7 @@ from pathlib import Path
 
 from backbone.command_line.joining import finite
 from backbone.command_line.opened_recording import NothingSelected, opened
-from backbone.command_line.unusable_file import FileUnusable
+from backbone.command_line.unusable_file import FileUnusable, unreadable
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.recording.comparison import Difference, KeyComparison, Named, compared, pairs_in
@@ -54,7 +54,9 @@ async def compare_detection(paths: Sequence[Path], marks_file: Path, later_s: fl
 def _marks(path: Path) -> list[Mark]:
     try:
         return read_marks(path.read_text())
-    except (OSError, UnicodeError) as error:
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except UnicodeError as error:
         raise FileUnusable(f"{path} cannot be read: {error}") from error
 
 

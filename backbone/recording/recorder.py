@@ -228,7 +228,7 @@ class Recorder:
             elif self._note_deletion() or self._is_long:
                 self._split()
         except OSError as error:
-            self._fill(str(error))
+            self._fill(error)
 
     @property
     def _is_long(self) -> bool:
@@ -261,7 +261,7 @@ class Recorder:
         try:
             await in_thread_within(close, None)
         except OSError as error:
-            self._fill(str(error))
+            self._fill(error)
 
     def _new_writer(self) -> RecordingWriter:
         return RecordingWriter(self._files.file, *self._facts)
@@ -280,15 +280,15 @@ class Recorder:
             self._note_deletion()
             self._files.close()
         except OSError as error:
-            self._fill(str(error))
+            self._fill(error)
         self._say(f"{self._who} records no more{f': {self.full}' if self.full else ''}", LogLevel.NOTICE)
 
     def _fail(self, bug: BaseException) -> None:
         self._bug = self._bug or bug
         self.end()
 
-    def _fill(self, why: str) -> None:
-        self.full = self.full or why
+    def _fill(self, why: str | OSError) -> None:
+        self.full = self.full or (why if isinstance(why, str) else why.strerror or str(why))
 
     def _link_changed(self, is_up: bool) -> None:
         if is_up and not self._has_link:
@@ -344,7 +344,7 @@ class Recorder:
         try:
             self._writer.write(key, raw, self._clock.now_s())
         except OSError as error:
-            self._fill(str(error))
+            self._fill(error)
 
     async def _ask(self) -> None:
         """Ask for states from before the begin; the answers are overheard like all others."""

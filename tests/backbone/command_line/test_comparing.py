@@ -12,6 +12,7 @@ from small_recordings import SCOUT, Said, recorded
 from backbone.command_line import comparing
 from backbone.command_line.comparing import print_comparison
 from backbone.command_line.opened_recording import NothingSelected
+from backbone.command_line.unusable_file import FileUnusable
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode
@@ -76,3 +77,9 @@ async def test_keys_that_no_message_has_are_refused(tmp_path: Path) -> None:
     with pytest.raises(NothingSelected, match="matches \\*/redings"):
         await comparing.compare(night, night, ("*/redings",), {}, as_json=False)
     assert await comparing.compare(night, night, ("*/log",), {}, as_json=False) is ExitCode.DONE
+
+
+async def test_marks_that_cannot_be_read_are_refused_in_words(tmp_path: Path) -> None:
+    with pytest.raises(FileUnusable) as refused:
+        await comparing.compare_detection([], tmp_path / "marks.jsonl", 0.0, as_json=False)
+    assert refused.value.detail == f"{tmp_path}/marks.jsonl cannot be read: No such file or directory"

@@ -80,7 +80,7 @@ def test_if_its_folder_is_deleted_it_ends_and_tells_the_loss_once(tmp_path: Path
             await clock.sleep_s(2 * FLUSH_EACH_S)
             shutil.rmtree(folder)
             await running
-            assert "No such file" in recorder.full
+            assert recorder.full == "No such file or directory"
             assert (recorder.deleted > 0, recorder.written) == (True, 0)
             assert alarms == [f"it.mcap was deleted while it was recorded to; {recorder.deleted} messages are lost"]
             await bus.close()
