@@ -13,7 +13,7 @@ from backbone.errors import Refusal
 from backbone.naming import did_you_mean
 from backbone.recording.json_schema import TAG, fields_of
 from backbone.recording.reader import Recorded
-from backbone.wire import WIRE_VERSION, Envelope, Message, plain, schema_of
+from backbone.wire import WIRE_VERSION, Envelope, Message, naming_field, plain, schema_of
 
 WRITE_ONE = 'Write an object like {"schema": "Halt", "epoch": 3}; "watch KEY --json" shows messages with their fields.'
 Kind = TypeVar("Kind", bound=Message)
@@ -39,7 +39,7 @@ def revived(kind: type[Kind], body: dict[str, Any] | list[Any]) -> Kind:
         listed = body if isinstance(body, list) else _listed_struct(kind, body)
         return msgspec.json.decode(msgspec.json.encode(listed), type=kind)
     except (msgspec.DecodeError, LookupError, TypeError, AttributeError, RecursionError) as error:
-        raise OtherForm(f"{schema_of(kind)}: {error}") from error
+        raise OtherForm(f"{schema_of(kind)}: {naming_field(str(error), kind)}") from error
 
 
 @dataclass(slots=True)

@@ -84,3 +84,9 @@ def test_a_message_with_other_values_is_refused_with_how_to_write_it(said: dict[
 @pytest.mark.parametrize("text", [DEEP, "9" * 5000], ids=["deep", "many digits"])
 def test_a_value_that_is_too_much_to_be_json_is_a_text(text: str) -> None:
     assert json_or_text(text) == text
+
+
+def test_the_field_with_a_wrong_value_is_named() -> None:
+    with pytest.raises(OtherForm) as refused:
+        message_from(CLASSES, {"schema": "SetParameter", "name": 5, "value": 1})
+    assert refused.value.detail == "SetParameter/1: Expected `str`, got `int`, in name"
