@@ -16,7 +16,7 @@ import os
 import socket
 import struct
 from collections import deque
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,7 +38,7 @@ class Copy(NamedTuple):
     """A copy as it arrives.
 
     Attributes:
-        key: Key of the message.
+        key: Key of the message; empty: none, only the number of dropped copies, from a process that ends.
         raw: Envelope of the message.
         dropped: Copies that its sender dropped before it.
         end: Where the next copy begins.
@@ -85,8 +85,8 @@ class HostCopies:
     def __init__(self, directory: Path) -> None:
         self._directory, self._loop = directory, asyncio.get_running_loop()
         self._socket: socket.socket | None = None
-        self._waiting: deque[memoryview] = deque()
-        self._waiting_bytes = 0
+        self._waiting: deque[tuple[memoryview, int | None]] = deque()  # with the last part of a copy, its ``dropped``
+        self._waiting_bytes = self._counted = 0
         self._is_full = False
         self._look_again_s = -math.inf
         self.dropped = 0
@@ -116,14 +116,25 @@ class HostCopies:
             self.dropped += 1
             return
         header = header_of(key, raw, self.dropped)
-        for part in (header, raw) if len(raw) > SMALL_BYTES else (header + raw,):
-            self._waiting.append(memoryview(part))
-            self._waiting_bytes += len(part)
+        if len(raw) > SMALL_BYTES:
+            self._waiting.append((memoryview(header), None))
+            self._waiting.append((memoryview(raw), self.dropped))
+        else:
+            self._waiting.append((memoryview(header + raw), self.dropped))
+        self._waiting_bytes += len(header) + len(raw)
         if not self._is_full:
             self._send_waiting()
 
     def close(self) -> None:
-        """Send no more. Idempotent."""
+        """Send no more. Idempotent.
+
+        A recorder that is too slow learns by a connection of its own how many copies it does not get, because the
+        other one is full.
+        """
+        lost = self.dropped - self._counted + sum(dropped is not None for _part, dropped in self._waiting)
+        if self._socket is not None and lost:
+            with suppress(OSError), closing(_connected(Path(self._socket.getpeername()))) as farewell:
+                farewell.send(header_of("", b"", lost))
         self._disconnect()
         self._look_again_s = math.inf
 
@@ -132,7 +143,7 @@ class HostCopies:
         for name in (MISSION_SOCKET, HOST_SOCKET):
             with suppress(OSError):  # no recorder listens there, or no descriptors are left
                 made = _connected(self._directory / name)
-                self._socket, self.reach_mission, self.dropped = made, name == MISSION_SOCKET, 0
+                self._socket, self.reach_mission, self.dropped, self._counted = made, name == MISSION_SOCKET, 0, 0
                 self._loop.add_reader(made, self._ended)
                 return
 
@@ -154,12 +165,14 @@ class HostCopies:
         assert self._socket is not None  # noqa: S101  a writer of the socket, or called beside it
         try:
             while self._waiting:
-                sent = self._socket.send(self._waiting[0])
+                part, dropped = self._waiting[0]
+                sent = self._socket.send(part)
                 self._waiting_bytes -= sent
-                if sent == len(self._waiting[0]):
-                    self._waiting.popleft()
-                else:
-                    self._waiting[0] = self._waiting[0][sent:]
+                if sent < len(part):
+                    self._waiting[0] = part[sent:], dropped
+                    continue
+                self._waiting.popleft()
+                self._counted = self._counted if dropped is None else dropped
         except BlockingIOError:
             self._become_full(True)
         except OSError as error:

@@ -173,5 +173,6 @@ class _CopySender:
         at = 0
         while (copy := copy_at(self._came, at)) is not None:
             self.dropped, at = copy.dropped, copy.end
-            listener(copy.key, copy.raw)
+            if copy.key:
+                listener(copy.key, copy.raw)
         del self._came[:at]

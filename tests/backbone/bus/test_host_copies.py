@@ -96,6 +96,24 @@ async def test_while_a_recorder_hangs_copies_are_dropped_and_counted(folder: Pat
         await until(lambda: copies.dropped == ear.dropped, "they are still counted")
 
 
+@pytest.mark.parametrize("size", [100_000])
+@pytest.mark.parametrize("is_drained", [False, True])
+async def test_what_a_process_had_not_sent_when_it_ended_is_counted(
+    folder: Path, size: int, *, is_drained: bool
+) -> None:
+    heard = Heard()
+    async with listening(folder, heard) as ear:
+        copies, count = HostCopies(folder), 2 * MOST_WAITING_BYTES // size
+        for _ in range(count):  # without a turn for the recorder
+            copies.send(KEY, bytes(size))
+        assert copies.dropped > 0
+        if is_drained:
+            await until(lambda: len(heard) == count - copies.dropped, "what was not dropped came")
+        copies.close()
+        await until(lambda: len(heard) + ear.dropped == count, "each copy came or is counted")
+        assert all(key == KEY for key, _raw in heard)
+
+
 async def test_a_recorder_that_begins_late_or_again_gets_what_is_sent_from_then_on(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
