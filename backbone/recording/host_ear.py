@@ -18,6 +18,7 @@ from backbone.errors import Refusal
 
 READ_BYTES = 256 * 1024  # chosen: as much as a unix socket holds by default on Linux
 AT_ONCE = 4  # chosen: after a megabyte of one process, the other processes are read
+FULL_BYTES = 16 * 1024  # measured: as many bytes of the smallest copies fill a unix socket, because each has overhead
 LOOK_EACH_S = 0.1  # chosen: waking up for each copy costs more than reading it; a file is flushed less often
 AGAIN_S = 0.001  # chosen: meanwhile a sender fills its socket again
 _TOO_MANY_FILES = (errno.EMFILE, errno.ENFILE)
@@ -35,7 +36,8 @@ class EarTaken(Refusal):
 class HostEar:
     """Receives copies at a socket in the mission's folder of this host.
 
-    Ten times a second it reads all copies that wait. If a large copy has arrived only in part, it reads again at once.
+    Ten times a second it reads all copies that wait. If a large copy has arrived only in part, or a process may have
+    filled its socket, it reads again at once.
 
     Args:
         directory: The folder.
@@ -166,7 +168,7 @@ class _CopySender:
             self._came += some
             self._tell(listener)
             if len(some) < READ_BYTES and not self._came:
-                return False
+                return len(some) > FULL_BYTES
         return True
 
     def _tell(self, listener: Overhearer) -> None:

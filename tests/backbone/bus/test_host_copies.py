@@ -96,7 +96,7 @@ async def test_while_a_recorder_hangs_copies_are_dropped_and_counted(folder: Pat
         await until(lambda: copies.dropped == ear.dropped, "they are still counted")
 
 
-@pytest.mark.parametrize("size", [100_000])
+@pytest.mark.parametrize("size", [100, 100_000])
 @pytest.mark.parametrize("is_drained", [False, True])
 async def test_what_a_process_had_not_sent_when_it_ended_is_counted(
     folder: Path, size: int, *, is_drained: bool
