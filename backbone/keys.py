@@ -13,6 +13,8 @@ from functools import lru_cache
 from backbone.naming import IllegalName
 
 ROOT = "scout"
+KEY_OF_HUB = f"{ROOT}/hub"
+"""Key of the token of a hub, which every client of it finds."""
 _ANY = "+"  # replaces * in the key of a token, which cannot contain *
 _SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # a legal segment of a key expression, or * for any segment
 

@@ -32,7 +32,8 @@ from backbone.bus.interface import (
 from backbone.bus.local_bus import LocalNetwork, Neighbor
 from backbone.bus.zenoh_bus import ZenohBus
 from backbone.bus.zenoh_far_copies import FarCopies
-from backbone.bus.zenoh_sessions import client_config, close_session, open_session, watch_links
+from backbone.bus.zenoh_links import Links
+from backbone.bus.zenoh_sessions import client_config, close_session, open_session
 from backbone.bus.zenoh_subscribers import Subscribers
 from backbone.keys import Conversation
 from backbone.quality import NEVER_DROPPED
@@ -54,7 +55,7 @@ class SharedSession:
 
     def __init__(self, mission: str, endpoint: str, secret: str = "", directory: str = "") -> None:
         self._session = open_session(client_config(endpoint, secret))
-        self._links = watch_links(self._session)
+        self._links = Links(self._session)
         self._neighbors = LocalNetwork(mission)
         self._copies, self._far = copies_for(directory), cast("FarCopies | None", None)
         self._lines, self._subscribers = lines_for(directory), Subscribers(self._session)
@@ -72,6 +73,7 @@ class SharedSession:
 
     async def close(self) -> None:
         """Close the session; return when its threads have ended."""
+        self._links.close()
         for sockets in (self._copies, self._far, self._lines):
             if sockets is not None:
                 sockets.close()

@@ -1,4 +1,4 @@
-"""Sockets that a library opened in this process: closing them must not block.
+"""Sockets that a library opened in this process: their close must not block, and a useless one is shut down.
 
 A TCP link of zenoh lingers: its close blocks the thread that closes it until the peer has acknowledged all data, 10 s
 at most (zenoh 1.10, ``TCP_LINGER_TIMEOUT``). If a cable is cut, this blocks the few threads through which a hub
@@ -11,6 +11,7 @@ import contextlib
 import os
 import socket
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 _NO_LINGER = struct.pack("ii", 0, 0)  # the system's default: close returns at once, and the system sends the rest
@@ -18,10 +19,20 @@ _NO_LINGER = struct.pack("ii", 0, 0)  # the system's default: close returns at o
 
 def close_without_waiting() -> None:
     """Make the close of every present TCP socket of this process return at once."""
+    _for_each(lambda one: one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER))
+
+
+def shut_down(port: int) -> None:
+    """End the connections of this process from this local TCP port: each peer closes first, then this process."""
+    _for_each(lambda one: one.shutdown(socket.SHUT_WR) if one.getsockname()[1] == port else None)
+
+
+def _for_each(act: Callable[[socket.socket], None]) -> None:
+    """Call a function with another handle of each present TCP socket of this process."""
     for entry in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(OSError), _same_socket(int(entry.name)) as same:  # no socket, or closed meanwhile
             if same.family in (socket.AF_INET, socket.AF_INET6) and same.type == socket.SOCK_STREAM:
-                same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
+                act(same)
 
 
 def _same_socket(number: int) -> socket.socket:

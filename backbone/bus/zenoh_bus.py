@@ -44,6 +44,7 @@ from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, 
 from backbone.bus.near_listening import EachNear, NearListening
 from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
 from backbone.bus.zenoh_life import LifeBus
+from backbone.bus.zenoh_links import Links
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
 from backbone.bus.zenoh_questions import Asked, DirectQuestion, Query, Ways, new_inbox, query
 from backbone.bus.zenoh_sessions import (
@@ -53,7 +54,6 @@ from backbone.bus.zenoh_sessions import (
     is_hub,
     open_session,
     open_when_up,
-    watch_links,
 )
 from backbone.bus.zenoh_subscribers import Subscribers
 from backbone.errors import Refusal
@@ -108,7 +108,7 @@ class ZenohBus(LifeBus):
         self.subscribers = Subscribers(session, is_hub=is_hub)
         """Settable: one for all buses of a session."""
         self._shared = shared
-        self._links = None if shared else watch_links(session)
+        self._links = None if shared else Links(session, is_hub=is_hub)
         self._outlets = Outlets(session, mission, source, self.quality, only_elsewhere=shared)
         self.lossless = LosslessStreams(self, session, mission, source, only_elsewhere=shared)
         """Streams to listeners that must get every message."""
@@ -367,6 +367,8 @@ class ZenohBus(LifeBus):
         self.ways.close()
         self.lossless.close()
         if not self._shared:
+            if self._links is not None:
+                self._links.close()
             self._outlets.close_boards()
             for sockets in (self.far, self.copies, self.ways.lines):
                 if sockets is not None:

@@ -8,7 +8,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import zenoh
 
-from backbone.bus.sockets import close_without_waiting
 from backbone.bus.zenoh_settings import client_settings, hub_settings
 from backbone.errors import HubUnreachable
 
@@ -67,16 +66,6 @@ async def open_when_up(config: zenoh.Config) -> zenoh.Session:
         raise
     except zenoh.ZError as error:
         raise _unreachable(config, error) from error
-
-
-def watch_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None]:
-    """Keep the close of this session's TCP links from blocking, as long as the caller keeps the result."""
-
-    def changed(event: zenoh.LinkEvent) -> None:
-        if event.kind == zenoh.SampleKind.PUT and event.link.src.startswith("tcp/"):
-            close_without_waiting()
-
-    return session.info.declare_link_events_listener(zenoh.handlers.Callback(changed, indirect=False), history=True)
 
 
 async def close_session(session: zenoh.Session) -> None:

@@ -68,6 +68,13 @@ class NetworkHost:
         """Put the cable back."""
         _ip("-n", self.switch, "link", "set", self._port, "up")
 
+    def change_address(self, address: str) -> None:
+        """Replace this machine's address, as a network may that gives it another one."""
+        words = [IP, "-n", self.namespace, "-4", "-brief", "address", "show", "eth0"]
+        listed = subprocess.run(words, capture_output=True, text=True, check=True)
+        _ip("-n", self.namespace, "address", "del", listed.stdout.split()[2], "dev", "eth0")
+        _ip("-n", self.namespace, "address", "add", f"{address}/24", "dev", "eth0")
+
     def change_weather(self, weather: Weather) -> None:
         """Let the poor link of this machine lose, delay, limit or stall frames from now on."""
         assert self.link is not None, f"{self.name} hangs on a cable"

@@ -1,0 +1,125 @@
+"""A link over TCP that passes no messages is replaced; one that passes them stays."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+import zenoh
+from free_ports import free_endpoint
+
+from backbone.bus import zenoh_links
+from backbone.bus.clock import MissionClock
+from backbone.bus.shared_bus import SharedSession
+from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.zenoh_life import LifeBus
+from backbone.keys import KEY_OF_HUB
+
+MISSION, CLIENT = "links", "ui_console/client"
+NOTICED_WITHIN_S = 10.0
+LONGEST_KEEP_ALIVE = 2  # bytes, in zenoh 1.10
+
+
+@pytest.fixture(autouse=True)
+def quick_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_links, "LOOK_EACH_S", 0.05)
+    monkeypatch.setattr(zenoh_links, "ANSWER_WITHIN_S", 0.1)
+
+
+async def changes(bus: LifeBus, number: int, within_s: float = NOTICED_WITHIN_S) -> list[bool]:
+    """Return whether the link came or went, so many times or until the time is over."""
+    seen: list[bool] = []
+    enough = asyncio.Event()
+
+    def changed(up: bool) -> None:
+        seen.append(up)
+        if len(seen) == number:
+            enough.set()
+
+    watching = bus.watch_link(changed)
+    try:
+        async with asyncio.timeout(within_s):
+            await enough.wait()
+    except TimeoutError:
+        pass
+    finally:
+        watching.close()
+    return seen
+
+
+@pytest.mark.parametrize("shared", [False, True])
+async def test_a_link_without_messages_is_replaced_until_messages_pass(shared: bool) -> None:
+    endpoint, clock = free_endpoint(), MissionClock.started_now()
+    hub = await asyncio.to_thread(zenoh.open, hub_config([endpoint]))  # says nothing, as a deaf link
+    session = SharedSession(MISSION, endpoint) if shared else None
+    bus = session.join(CLIENT, clock) if session else ZenohBus.open(MISSION, CLIENT, clock, client_config(endpoint))
+    try:
+        assert await changes(bus, 4) == [True, False, True, False]
+        token = hub.liveliness().declare_token(KEY_OF_HUB)
+        assert (await changes(bus, 9, within_s=1.0))[-1]
+        assert await changes(bus, 2, within_s=0.5) == [True]
+        token.undeclare()  # type: ignore[no-untyped-call]
+    finally:
+        await bus.close()
+        if session:
+            await session.close()
+        await asyncio.to_thread(hub.close)
+
+
+@asynccontextmanager
+async def a_deaf_connection_first(hub_port: int) -> AsyncIterator[tuple[int, asyncio.Event]]:
+    """Give a port through which a hub is reached, and what makes the first connection pass keep-alives only."""
+    is_deaf, streams, tasks = asyncio.Event(), list[asyncio.StreamWriter](), set[asyncio.Task[None]]()
+
+    async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, may_be_deaf: bool) -> None:
+        try:
+            while True:
+                length = await reader.readexactly(2)
+                batch = await reader.readexactly(int.from_bytes(length, "little"))
+                if len(batch) <= LONGEST_KEEP_ALIVE or not (may_be_deaf and is_deaf.is_set()):
+                    writer.write(length + batch)
+        except (asyncio.IncompleteReadError, ConnectionError):
+            writer.close()
+
+    async def connected(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        hub_reader, hub_writer = await asyncio.open_connection("127.0.0.1", hub_port)
+        is_first = not streams
+        streams.extend((writer, hub_writer))
+        tasks.add(asyncio.create_task(carry(reader, hub_writer, may_be_deaf=False)))
+        tasks.add(asyncio.create_task(carry(hub_reader, writer, may_be_deaf=is_first)))
+
+    server = await asyncio.start_server(connected, "127.0.0.1", 0)
+    try:
+        yield server.sockets[0].getsockname()[1], is_deaf
+    finally:
+        server.close()
+        for stream in streams:
+            stream.close()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def test_a_link_that_only_keeps_itself_alive_is_replaced() -> None:
+    endpoint, clock = free_endpoint(), MissionClock.started_now()
+    hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
+    async with a_deaf_connection_first(int(endpoint.rpartition(":")[2])) as (port, is_deaf):
+        bus = await ZenohBus.open_when_up(MISSION, CLIENT, clock, client_config(f"tcp/127.0.0.1:{port}"))
+        is_deaf.set()
+        try:
+            assert await changes(bus, 3) == [True, False, True]
+            assert await changes(bus, 2, within_s=0.5) == [True]
+        finally:
+            await bus.close()
+    await hub.close()
+
+
+async def test_a_link_to_a_hub_stays() -> None:
+    endpoint, clock = free_endpoint(), MissionClock.started_now()
+    hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
+    bus = ZenohBus.open("another", CLIENT, clock, client_config(endpoint))
+    try:
+        assert await changes(bus, 2, within_s=0.5) == [True]
+    finally:
+        await bus.close()
+        await hub.close()
