@@ -136,10 +136,8 @@ async def record_to(
         say(f"incomplete: {missing_in(recorder.away_s)}")
     if recorder.deleted:
         say(f"incomplete: {counted(recorder.deleted, 'message')} were in a file that was deleted meanwhile")
-    if recorder.was_started_again:
-        say("the recording ended because the mission was started again")
-    if recorder.full:
-        say(f"the recording ended because {recorder.full}")
+    if recorder.why_ended:
+        say(f"the recording ended because {recorder.why_ended}")
     return ExitCode.REFUSED if recorder.full else ExitCode.DONE
 
 

@@ -114,7 +114,7 @@ class Recorder:
         self._one_at_a_time, self._needs_snapshot = asyncio.Lock(), asyncio.Event()
         self._ended = asyncio.Event()
         self._closing: dict[asyncio.Task[None], None] = {}
-        self._has_link, self._is_back = True, asyncio.Event()
+        self._has_link, self._is_cut_off, self._is_back = True, False, asyncio.Event()
         self._absence, self._has_other_hosts = LinkAbsence(STILL_COME_S if is_lossless else 0.0), False
         self.was_started_again = False
         """True: it ended because a later mission of the same name is up."""
@@ -139,6 +139,13 @@ class Recorder:
     def away_s(self) -> float:
         """Seconds of the machine in which the hub was away, and an unknown number of messages was lost."""
         return self._absence.total_s
+
+    @property
+    def why_ended(self) -> str:
+        """Return why it ended by itself; empty: by an order, or it records."""
+        if self.full or self.was_started_again:
+            return self.full or "the mission was started again"
+        return "the mission has ended, or its hub cannot be reached" if self._is_cut_off else ""
 
     def end(self) -> None:
         """End in good order; then ``run`` returns."""
@@ -216,6 +223,7 @@ class Recorder:
                 dropped += news
             silent_s = 0.0 if self._has_link else silent_s + FLUSH_EACH_S
             if silent_s > GONE_AFTER_S:
+                self._is_cut_off = True
                 self.end()
 
     def _flush(self) -> None:

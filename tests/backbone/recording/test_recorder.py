@@ -257,6 +257,29 @@ def test_it_ends_when_a_later_mission_of_the_name_is_up(tmp_path: Path, local_mi
     assert said == ["event 1"]
 
 
+def test_it_says_that_it_ended_because_its_hub_stayed_away(tmp_path: Path, local_mission: Any) -> None:
+    async def play() -> None:
+        clock = VirtualClock()
+        async with local_mission("local") as network:
+            bus = network.join("backbone/recorder", clock)
+            links: list[Any] = []
+            bus.watch_link = links.append
+            recorder = Recorder(bus, clock, files=RecordingFiles(tmp_path / "it.mcap"), classes=CLASSES, about={})
+            running = asyncio.create_task(recorder.run())
+            await clock.sleep_s(30.0)
+            links[0](False)
+            await clock.sleep_s(4.0)
+            assert (running.done(), recorder.why_ended) == (False, "")
+            await clock.sleep_s(4.0)
+            assert (running.done(), recorder.why_ended) == (
+                True,
+                "the mission has ended, or its hub cannot be reached",
+            )
+            await bus.close()
+
+    run_virtual(play())
+
+
 @pytest.mark.parametrize(("split_s", "split_bytes"), [(2.0, 10**9), (1e6, 3_000)])
 @pytest.mark.parametrize("keep", [0, 2])
 def test_a_long_recording_goes_on_in_further_files(
