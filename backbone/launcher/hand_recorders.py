@@ -127,7 +127,8 @@ def _absence(one: _Recorder) -> Absence:
     host, pid = one.beat.host, one.beat.pid
     doing = f"its recording stands still, and messages may be missing in {one.beat.file}"
     mend = "then 'scout-backbone record recover' mends its file"
-    remedy = f"Wake it on {host} by 'kill -CONT {pid}', or 'kill -9 {pid}'; {mend}."
+    wake = "Wake it" if host == socket.gethostname() else f"Check the link to {host}. If it is sound, wake the recorder"
+    remedy = f"{wake} on {host} by 'kill -CONT {pid}', or 'kill -9 {pid}'; {mend}."
     return Absence(one.name, one.heard_s, "it does not respond", doing, remedy)
 
 
