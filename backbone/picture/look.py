@@ -16,7 +16,7 @@ from backbone.bus.interface import Bus
 from backbone.component.messages import Absence, AskTime, MissionTime
 from backbone.component_database.messages import ListTypes, TypeCount, Types
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.creator.messages import ListProcesses, Processes, ProcessState, offer_name
+from backbone.creator.messages import ListProcesses, Processes, ProcessState
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import component_of
@@ -61,9 +61,9 @@ async def look(
         return before
     listed(listing)
     picture = before or MissionPicture(bus.mission, rate=rate)
-    there = {component_of(one.address) for one in listing.components}
+    first = {one.host for one in listing.components if one.address == NAMESERVER}
     creators = {one.address: one.host for one in listing.components if one.type == CREATOR}
-    offered = {at: host if offer_name(host) in there else "" for at, host in sorted(creators.items())}
+    offered = {at: host if first - {host} else "" for at, host in sorted(creators.items())}
     answers = await asyncio.gather(
         _ask_or_absence(bus, now_s, RC_MANAGER, AskSchedule(), Schedule)
         if schedule

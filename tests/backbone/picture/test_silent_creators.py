@@ -19,6 +19,7 @@ async def seen(*types: tuple[str, str]) -> tuple[Absence, ...]:
     """Return what is missed if the services answer, but no component of these types and hosts does."""
     network, clock = LocalNetwork("m"), VirtualClock()
     listed = [ComponentState(f"backbone/{kind}-{host}", kind, host, 7, LifeState.READY, 0.0) for kind, host in types]
+    listed.append(ComponentState(NAMESERVER, "nameserver", "base", 7, LifeState.READY, 0.0))
 
     async def answer(asked: Envelope[Message]) -> Message:
         match asked.body:
@@ -43,6 +44,7 @@ async def seen(*types: tuple[str, str]) -> tuple[Absence, ...]:
     [
         ([("creator", "base")], "the launcher restarts it", HealthWord.FAILED),
         ([("creator", "far"), ("offer", "far")], "far restarts it if it hangs", HealthWord.DEGRADED),
+        ([("creator", "far")], "far restarts it if it hangs", HealthWord.DEGRADED),  # its offer's link fell first
     ],
 )
 def test_who_replaces_a_silent_creator_is_told_and_a_slow_link_fails_no_mission(
