@@ -49,7 +49,7 @@ from backbone.creator.messages import (
     StartFailed,
 )
 from backbone.creator.shared_process_keeper import SharedProcessKeeper
-from backbone.creator.signs_of_life import ReadVitals, SignsOfLife
+from backbone.creator.signs_of_life import ReadVitals, Sign, SignsOfLife
 from backbone.creator.silence import LOOK_EVERY_S
 from backbone.creator.supervision import Phase, Supervision
 from backbone.creator.zygote import Forks, NoProcess
@@ -279,17 +279,17 @@ class ProcessKeeper:
             for sign in self._signs.look(run_directory, pids, now_s):
                 if sign.hangs:
                     self._zygote.kill(sign.pid, WRITE_STACKS)
-                self._observed(sign.pid, sign.silent_s, now_s, beats=sign.beats)
+                self._observed(sign, now_s)
             trouble = self._zygote.keep_running()
             if trouble != self._zygote_trouble:
                 self._zygote_trouble, self._zygote_trouble_since_s = trouble, now_s
                 self.on_changed()
 
-    def _observed(self, pid: int, silent_s: float, now_s: float, *, beats: bool) -> None:
-        self._shared.observed(pid, silent_s, now_s)
-        for one in [one for one in self._supervision if one.pid == pid]:
-            if beats or one.phase is not Phase.READY:  # a ready process without a beat could not create its file
-                self._carry_out(self._supervision.observed(one.name, silent_s, now_s))
+    def _observed(self, sign: Sign, now_s: float) -> None:
+        self._shared.observed(sign.pid, sign.silent_s, now_s, sign.late_s)
+        for one in [one for one in self._supervision if one.pid == sign.pid]:
+            if sign.beats or one.phase is not Phase.READY:  # a ready process without a beat could not create its file
+                self._carry_out(self._supervision.observed(one.name, sign.silent_s, now_s, sign.late_s))
 
     def _exited(self, pid: int, returncode: int) -> None:
         self._signs.forget(pid)

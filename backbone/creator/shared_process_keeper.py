@@ -104,9 +104,9 @@ class SharedProcessKeeper:
         """End the member, with its process if the member alone cannot be ended."""
         self._carry_out(self._shared.signalled(name, number))
 
-    def observed(self, pid: int, silent_s: float, now_s: float) -> None:
-        """Record for how long the process has shown no sign of life."""
-        self._carry_out(self._shared.observed(pid, silent_s, now_s))
+    def observed(self, pid: int, silent_s: float, now_s: float, late_s: float) -> None:
+        """Record for how long the process has shown no sign of life, and for how long it could not run."""
+        self._carry_out(self._shared.observed(pid, silent_s, now_s, late_s))
 
     def exited(self, pid: int, returncode: int) -> None:
         """Report the end of the process to all its members."""

@@ -263,14 +263,20 @@ class SharedProcesses:
             instructions.append(ForkProcess(one.name, next(iter(left))))
         return self._and_wake(instructions)
 
-    def observed(self, pid: int, silent_s: float, now_s: float) -> list[ProcessInstruction]:
-        """Record the silence of this process: its deadlines count from the start of the silence."""
+    def observed(self, pid: int, silent_s: float, now_s: float, late_s: float = 0.0) -> list[ProcessInstruction]:
+        """Record the silence of this process: its deadlines count from the start of the silence.
+
+        Args:
+            late_s: Seconds since the last observation in which it could not run; its end may take so much longer.
+        """
         has_changed = False
         for one in self._all.values():
             if one.pid != pid:
                 continue
             if one.phase is _Phase.STARTING:
                 one.deadline_s, has_changed = now_s - silent_s + SERVES_WITHIN_S, True
+            elif one.phase is _Phase.ENDING and late_s:
+                one.deadline_s, has_changed = one.deadline_s + late_s, True
             for member in one.members.values():
                 if member.place is _Place.ADMITTING:
                     member.deadline_s, has_changed = now_s - silent_s + ADMITS_WITHIN_S, True

@@ -19,12 +19,14 @@ class Sign(NamedTuple):
     Attributes:
         pid: The process.
         silent_s: Seconds of the machine for which it has shown no sign of life.
+        late_s: Seconds of the machine, since the last observation, in which it could not run or was not looked at.
         beats: True if it has written a heartbeat.
         hangs: True once in a silence, when it is time to write the stacks of the process.
     """
 
     pid: int
     silent_s: float
+    late_s: float
     beats: bool
     hangs: bool
 
@@ -49,7 +51,7 @@ class SignsOfLife:
                 silence, beats = self._silences.setdefault(pid, Silence()), vitals.beats > 0
                 before_s = silence.silent_s
                 silent_s = silence.look(vitals, now_s)
-                yield Sign(pid, silent_s, beats, before_s < STACKS_AFTER_S <= silent_s)
+                yield Sign(pid, silent_s, silence.late_s, beats, before_s < STACKS_AFTER_S <= silent_s)
 
     def doing(self, pid: int) -> str:
         """Return the present work of the process; empty if it is unknown."""

@@ -16,6 +16,8 @@ Rules:
 * A first start that fails by itself (an exit code above 0, silence) is not repeated, because its owner decides. A
   first start that ends from outside (a signal, a stop) is repeated under any policy, because its owner still waits. If
   it ended so ``FIRST_STARTS`` times, the component itself is the reason (a crash in a C library, a stop of its own).
+* A process that is being ended gets its times without the time in which it could not run. On a full machine the ends of
+  many components would otherwise need signals, and an RC that is killed leaves its hardware as it is.
 * A ready process that is silent for longer than its policy allows hangs. It is killed before it is restarted, so a
   process that was only paused never gets a second copy.
 """
@@ -47,7 +49,7 @@ from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHer
 from backbone.creator.silence import SHOWN_AFTER_S
 
 TERM_S = 0.5  # chosen: like EndProcess.term_s, for ends without an order
-LEAVE_S = 0.15  # chosen: a process ends 10 ms after it has left the bus, on a busy machine after ten times that
+LEAVE_S = 0.5  # chosen: a process ends 10 ms after it has left the bus; two looks at how long it could not run
 FIRST_STARTS = 5  # chosen: more than a person or the system ends by chance; takes under 2 s with its pauses
 NEVER_S = math.inf
 
@@ -231,11 +233,18 @@ class Supervision:
         one.end.not_heard, one.deadline_s = True, min(one.deadline_s, now_s + LEAVE_S)
         return self._and_wake([])
 
-    def observed(self, name: str, silent_s: float, now_s: float) -> list[Instruction]:
-        """Record the silence of its process; ignored for a component without a process."""
+    def observed(self, name: str, silent_s: float, now_s: float, late_s: float = 0.0) -> list[Instruction]:
+        """Record the silence of its process; ignored for a component without a process.
+
+        Args:
+            late_s: Seconds since the last observation in which it could not run; its end may take so much longer.
+        """
         one = self._all.get(name)
-        if one is None or one.end is not None:
+        if one is None:
             return []
+        if one.end is not None:
+            one.deadline_s += late_s
+            return self._and_wake([]) if late_s else []
         if one.phase is Phase.STARTING:
             one.deadline_s = min(now_s - silent_s + one.ready_within_s, one.began_s + START_MOST_S)
             return self._and_wake([])

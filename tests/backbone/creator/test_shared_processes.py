@@ -231,6 +231,13 @@ def test_the_last_member_is_gone_when_its_process_is() -> None:
     assert shared.exited(7, -9) == [MemberGone("scout1", 0, "exit code 0")]
 
 
+def test_a_process_that_could_not_run_while_it_ends_gets_that_time_more() -> None:
+    shared = living("scout1")
+    shared.member_ended(1, 0, 5.0)
+    assert shared.observed(7, 0.0, 5.25, late_s=0.25) == [ProcessesWakeAt(5.25 + TERM_S)]
+    assert shared.observed(7, 0.2, 5.5) == []
+
+
 def test_who_is_wanted_while_the_process_ends_gets_a_new_one() -> None:
     shared = living("scout1")
     shared.member_ended(1, 0, 5.0)

@@ -65,6 +65,14 @@ def test_a_supervisor_that_was_paused_calls_nobody_dead() -> None:
     assert play([(0.0, Vitals(7)), (60.0, Vitals(7)), (60.25, Vitals(8))]) == [0.0, LOOK_MOST_S, 0.0]
 
 
+def test_a_process_is_late_by_the_time_it_was_queued_or_not_looked_at_at_most_by_the_time_that_passed() -> None:
+    silence, late_s = Silence(), []
+    for at_s, queued_s in ((5.0, 3.0), (5.25, 3.125), (5.5, 3.125), (7.5, 3.25), (7.75, 4.25)):
+        silence.look(Vitals(7, queued_s=queued_s), at_s)
+        late_s.append(silence.late_s)
+    assert late_s == pytest.approx([0.0, 0.125, 0.0, 2.0 - LOOK_MOST_S + 0.125, 0.25])
+
+
 def test_stacks_are_due_once_in_a_silence_also_before_the_first_beat() -> None:
     """A constructor that waits for ever never beats; its place in the code is the only hint at the bug."""
     signs = SignsOfLife(lambda _directory, _pid: Vitals(0, doing="starts"))
