@@ -230,9 +230,10 @@ class ConsoleApp(ConsoleDisplay):
         """Pick a robot from the list."""
         if self._view is None:
             return
+        robot = self._session.model.robot
         self._open(
-            RobotPicker(robot_rows(self._view.robots, self._view.now_s), self._session.model.robot),
-            lambda robot: self._begin(partial(self._session.switch, robot)),
+            RobotPicker(robot_rows(self._view.robots, self._view.now_s, robot), robot),
+            lambda chosen: self._begin(partial(self._session.switch, chosen)),
         )
 
     def action_panel(self, steps: int) -> None:

@@ -51,11 +51,13 @@ class Row:
         key: The same as long as the row has the same subject.
         subject: Name for ``why``; empty: no explanation.
         text: One line, or more.
+        is_own: True for the operator's robot: it stays in view, and the cursor begins there.
     """
 
     key: str
     subject: str
     text: Text = field(compare=False)
+    is_own: bool = False
 
 
 def laid_out(rows: Sequence[Row], here: str | None, columns: int, room: int) -> list[list[Text]]:
@@ -71,6 +73,29 @@ def laid_out(rows: Sequence[Row], here: str | None, columns: int, room: int) -> 
     if sum(map(len, folded)) <= room:
         return folded
     return [lines if row.key == here else _cut(row.text, columns) for row, lines in zip(rows, folded, strict=True)]
+
+
+def in_view(rows: Sequence[Row], drawn: Sequence[list[Text]], here: str | None, room: int) -> list[Text]:
+    """Return the lines from the first one in view; if not all fit, the operator's own row comes first.
+
+    Args:
+        rows: From top to bottom.
+        drawn: The lines of each row.
+        here: Key of the row under the cursor, which is in view; None: the cursor is elsewhere.
+        room: Number of lines.
+    """
+    if sum(map(len, drawn)) <= room:
+        return list(itertools.chain(*drawn))
+    pinned = next((lines for row, lines in zip(rows, drawn, strict=True) if row.is_own), [])
+    lines: list[Text] = []
+    offset = 0
+    for row, its_lines in zip(rows, drawn, strict=True):
+        if its_lines is pinned:
+            continue
+        if row.key == here:
+            offset = min(len(lines), max(0, len(lines) + len(its_lines) - (room - len(pinned))))
+        lines += its_lines
+    return pinned + lines[offset:]
 
 
 def _folded(text: Text, columns: int) -> list[Text]:
@@ -104,7 +129,7 @@ def table_rows(name: PanelName, view: views.ConsoleView, columns: int) -> list[R
     now_s = view.now_s
     match name:
         case PanelName.ROBOTS:
-            return robot_rows(view.robots, now_s)
+            return robot_rows(view.robots, now_s, view.own.robot)
         case PanelName.TREE:
             return [Row(f"node:{one.name}", one.name, _node(one, now_s)) for one in view.tree]
         case PanelName.SCHEDULE:
@@ -125,10 +150,14 @@ def table_rows(name: PanelName, view: views.ConsoleView, columns: int) -> list[R
             return rows[::-1]
 
 
-def robot_rows(robots: list[views.RobotView], now_s: float) -> list[Row]:
-    """Return two lines for each robot: its holder, the remaining time, and the next one."""
-    wide = max((len(robot.robot) for robot in robots), default=0)
-    return [Row(f"robot:{robot.robot}", robot.robot, _robot(robot, now_s, wide)) for robot in robots]
+def robot_rows(robots: list[views.RobotView], now_s: float, own: str) -> list[Row]:
+    """Return two lines for each robot: its holder, the remaining time, and the next one.
+
+    Args:
+        own: The robot that the operator holds or wants.
+    """
+    wide = max((len(one.robot) for one in robots), default=0)
+    return [Row(f"robot:{one.robot}", one.robot, _robot(one, now_s, wide), one.robot == own) for one in robots]
 
 
 def lift_lines(stop: views.StopView) -> list[str]:

@@ -20,7 +20,7 @@ from textual.widgets import Static
 
 from backbone.spoken import counted
 from ui_console.terminal.keys import Hint, key_lines
-from ui_console.terminal.lines import Row, laid_out
+from ui_console.terminal.lines import Row, in_view, laid_out
 from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send
 from ui_console.terminal.video import fit, row_segments, shrink
 
@@ -106,8 +106,9 @@ class Panel(Static):
 
     @property
     def row(self) -> Row | None:
-        """The row under the cursor: the first row until the cursor was moved, and after its row has gone."""
-        return self.placed or (self._rows[0] if self._rows else None)
+        """The row under the cursor: until it was moved, or if its row has gone, the operator's own, else the first."""
+        own = next((row for row in self._rows if row.is_own), None)
+        return self.placed or own or (self._rows[0] if self._rows else None)
 
     @property
     def placed(self) -> Row | None:
@@ -127,27 +128,23 @@ class Panel(Static):
 
     def move(self, steps: int) -> None:
         """Move the cursor down, or up for negative steps, within the rows."""
-        if not self._rows:
+        if self.row is None:
             return
-        keys = [row.key for row in self._rows]
-        at = keys.index(self._key) if self._key in keys else 0
-        self._key = keys[min(max(0, at + steps), len(keys) - 1)]
+        at = self._rows.index(self.row)
+        self._key = self._rows[min(max(0, at + steps), len(self._rows) - 1)].key
         self._draw()
 
     def _draw(self) -> None:
         here, room = self.row, self._room()
         key = here.key if self._is_chosen and here is not None else None
         rows = laid_out(self._rows, key, self.content_size.width, room)
-        lines: list[Text] = []
-        offset = 0
         for row, its_lines in zip(self._rows, rows, strict=True):
             if row.key == key:
                 its_lines[0].stylize(CURSOR)
-                offset = min(len(lines), max(0, len(lines) + len(its_lines) - room))
-            lines += its_lines
-        is_cut = len(lines) > room
+        is_cut = sum(map(len, rows)) > room
         self.border_subtitle = f"{counted(len(rows), 'row')}: pgup, pgdn" if is_cut else ""
-        self._put(Text("\n").join(lines[offset:]) if rows else Text(self._nothing, style="dim"))
+        lines = in_view(self._rows, rows, key, room)
+        self._put(Text("\n").join(lines) if rows else Text(self._nothing, style="dim"))
 
     def _put(self, drawn: Text) -> None:
         before, self._drawn = self._drawn, drawn

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
+
+import msgspec
 import pytest
-from console_scenes import ASK, SCHEDULE, STOP, TEAM_EVENTS, held_model, model
+from console_scenes import ASK, GRANT, SCHEDULE, STOP, TEAM_EVENTS, held_model, model, rc
 from pressed_keys import FORWARD, SIZE
 from screen_text import screen_text
 from textual.widgets import Input
@@ -46,6 +50,42 @@ async def test_tab_goes_through_all_tables_and_back() -> None:
         assert seen == list(PanelName)
         await pilot.press("shift+tab")
         assert screen.chosen is PanelName.LOG
+
+
+def crowd(own: str, robots: int = 60) -> WrittenSession:
+    """Return the session of an operator who holds one of many robots."""
+    many = [rc(f"scout{number}", "scout", []) for number in range(1, robots + 1)]
+    asked, granted = (dataclasses.replace(event, robot=own) for event in (ASK, GRANT))
+    return WrittenSession(Heard(8.0, msgspec.structs.replace(SCHEDULE, rcs=many)), asked, granted)
+
+
+def robots_shown(app: ConsoleApp) -> list[str]:
+    return re.findall(r"\bscout\d+\b", str(app.query_one("#robots", Panel).content))
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 48)])
+async def test_the_operators_own_robot_is_always_among_the_robots_shown(size: tuple[int, int]) -> None:
+    """At 80 × 24 there are six lines for sixty robots."""
+    app = ConsoleApp(crowd("scout37"))
+    async with app.run_test(size=size) as pilot:
+        await settle(pilot)
+        assert robots_shown(app)[:2] == ["scout37", "scout1"]
+        assert app.query_one("#robots", Panel).row.subject == "scout37", "the cursor begins there"
+        for keys in (["pagedown"] * 9, ["pageup"] * 30, ["pagedown"] * 70, ["tab"]):
+            await pilot.press(*keys)
+            await settle(pilot)
+            shown = robots_shown(app)[:3]
+            assert shown[0] == "scout37"
+            assert len(set(shown)) == 3, "and it is shown once"
+
+
+async def test_the_cursors_row_is_shown_below_the_own_robot() -> None:
+    app = ConsoleApp(crowd("scout37"))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        await pilot.press(*["pagedown"] * 9)
+        await settle(pilot)
+        assert robots_shown(app)[:6] == ["scout37", *(f"scout{number}" for number in range(42, 47))]
 
 
 async def test_the_log_of_the_whole_mission_is_searched_and_followed() -> None:
