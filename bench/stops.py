@@ -29,7 +29,7 @@ from playwright.async_api import Error as PageError
 from stops_headless import Headless
 from stops_link import relay_to_mission
 from stops_page import page_present
-from stops_places import KINDS, OTHERS, ROBOT, Cell, Gesture, Link, cells
+from stops_places import KINDS, OPERATOR, OTHERS, OWN_STOP, ROBOT, Cell, Gesture, Link, cells
 from stops_table import markdown
 from stops_terminal import CANNOT, Script, Terminal, TriedConsole
 from stops_world import ROBOTS, NotSeen, World, until, world_of
@@ -93,10 +93,11 @@ class Runner:
             await self._console.shows_meant(cell.place.meant)
 
     async def _turn_all(self, cell: Cell) -> None:
-        world, is_stopped = self._world, cell.place.needs == "stopped"
+        world, needs = self._world, cell.place.needs
+        is_stopped = needs in ("stopped", OWN_STOP)
         await world.all_may_move()
         if is_stopped:
-            await world.stop(OTHERS[1])
+            await world.stop(OTHERS[1], *([OPERATOR] if needs == OWN_STOP else []))
         others = world.others_turn(OTHERS[:1] if is_stopped else OTHERS)
         for fault in await asyncio.gather(others, self._turn_own(cell), return_exceptions=True):
             if fault is not None:

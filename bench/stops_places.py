@@ -12,6 +12,8 @@ from enum import StrEnum
 ROBOT = "scout3"
 """The robot of the console that is tried."""
 OTHERS = ("scout1", "scout2")
+OPERATOR = "tina"  # at the terminal
+OWN_STOP = "stopped by the operator"
 """Robots that other operators drive meanwhile."""
 
 
@@ -51,8 +53,8 @@ class Place:
         open: Keys of a terminal, or a script of the page, that open it.
         shows: Pattern on the terminal, or condition of the page, once it is open; empty: no wait.
         close: Keys or script that lead back.
-        needs: Required state: "stopped" (another robot is stopped), "asked" (another operator asks), "held" (the
-            console holds ``ROBOT``, so there is no such cell while another operator does).
+        needs: Required state: "stopped" (another operator has stopped another robot), OWN_STOP (this one has), "asked"
+            (another operator asks), "held" (the console holds ``ROBOT``: no such cell while another operator does).
         meant: The robot that a stop of one robot concerns here while another operator holds ``ROBOT``.
     """
 
@@ -80,7 +82,10 @@ LOOKING = (
     Place("view of a behavior", "_look", "b Enter", "escape leaves", "Escape"),
     Place("list of the bus's keys", "action_heard", "B", "what is said", "Escape"),
 )
-LIFTING = (Place("dialog to lift", "action_lift", "c", "lift the stop of", "Escape", "stopped", OTHERS[1]),)
+LIFTING = (
+    Place("dialog to lift", "action_lift", "c", "lift the stop of", "Escape", "stopped", OTHERS[1]),
+    Place("dialog to lift one's own", "action_lift_own", "C", "lift your 1 stop", "Escape", OWN_STOP, OTHERS[1]),
+)
 WRITING = (
     Place("field of the log's search", "action_search", "/", "search the log", "Escape"),
     Place("field of a parameter", "action_edit", "i e", "x and X stop robots here too", "Escape" + " BTab" * 6),

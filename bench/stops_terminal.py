@@ -17,7 +17,7 @@ import psutil
 from measuring import BIN
 from stops_link import Relay
 from stops_pad import Pad
-from stops_places import KINDS, ROBOT, Gesture, Place
+from stops_places import KINDS, OPERATOR, OWN_STOP, ROBOT, Gesture, Place
 from stops_world import TURN, NotSeen, until
 
 from ui_console.model.driving import KEYS_LET_GO_S
@@ -113,7 +113,7 @@ class Terminal(TriedConsole):
     async def present(self, environment: dict[str, str], mission: str) -> AsyncIterator[Terminal]:
         """Run the console until the block ends."""
         program = self._pad.program() if self._has_gamepad else [str(BIN / "scout-console")]
-        words = " ".join([*program, *self.kind.words, "--user", "tina", "--mission", mission])
+        words = " ".join([*program, *self.kind.words, "--user", OPERATOR, "--mission", mission])
         columns, lines = self.kind.size
         size = ["-x", str(columns), "-y", str(lines)]
         given = [f"-e{name}={value}" for name, value in environment.items()]
@@ -142,7 +142,7 @@ class Terminal(TriedConsole):
         """See ``TriedConsole``."""
         if place.open and not place.of.startswith(("panel:", "action_bare")):
             await self._hold_no_key()
-        if place.needs == "stopped":
+        if place.needs in ("stopped", OWN_STOP):
             await self._shows(f"STOPPED: {place.meant}(?!,)")
         for key in place.open.split():
             await self._press(key)

@@ -202,9 +202,9 @@ class World:
         state = self._stops.get(robot)
         return 0 if state is None else state.number
 
-    async def stop(self, robot: str) -> None:
-        """Stop the robot as another operator does."""
-        await stop_robot(self.bus, robot, "a person stands there", "olga")
+    async def stop(self, robot: str, by: str = "olga") -> None:
+        """Stop the robot as an operator does who is at no console."""
+        await stop_robot(self.bus, robot, "a person stands there", by)
 
     async def all_may_move(self) -> None:
         """Lift every stop, also one that was given while a link was cut and arrives only now."""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Mapping
 from functools import partial
-from typing import TypeVar
 
 import msgspec
 from textual import work
@@ -21,10 +20,17 @@ from ui_console.model.key_table import KeyRow
 from ui_console.model.profile import Profile
 from ui_console.model.views import AlarmView
 from ui_console.session.gamepad import buttons_help
-from ui_console.terminal.dialogs import Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker, command_dialog
+from ui_console.terminal.dialogs import (
+    LiftQuestion,
+    LineQuestion,
+    OwnLiftQuestion,
+    Reading,
+    RobotPicker,
+    command_dialog,
+)
 from ui_console.terminal.display import ConsoleDisplay
 from ui_console.terminal.key_dialogs import KeyDialog, KeyPicker
-from ui_console.terminal.keys import keys_help, stop_meant
+from ui_console.terminal.keys import keys_help, own_stops, stop_meant
 from ui_console.terminal.lines import robot_rows
 from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
 from ui_console.terminal.order_dialog import order_dialog
@@ -32,38 +38,9 @@ from ui_console.terminal.tables import FIXED, PanelName
 from ui_console.terminal.view_dialogs import ViewDialog, views_dialog
 from ui_console.terminal.widgets import DrivePad, Panel
 
-A = TypeVar("A")
-
 
 class ConsoleApp(ConsoleDisplay):
     """One console's screen, and its keys."""
-
-    def _open(self, dialog: Dialog[A], answered: Callable[[A], object] | None = None, *, stale: str = "") -> None:
-        """Open a dialog; a key held at its opening or closing does not drive until it was released.
-
-        Args:
-            answered: Called with its answer.
-            stale: Message to show instead of the answer if the robot was stopped, freed, granted or lost meanwhile.
-        """
-
-        def closed(answer: A | None) -> None:
-            has_changed = self._session.model.moment != opened_at
-            self._session.require_let_go()
-            if answered is None or answer is None:
-                return
-            if stale and has_changed:
-                self.notify(stale, severity="warning")
-            else:
-                answered(answer)
-
-        self._session.require_let_go()
-        opened_at = self._session.model.moment
-        self.push_screen(dialog, closed)
-
-    @work
-    async def _begin(self, act: Callable[[], Awaitable[object]]) -> None:
-        """Run this in a task, so that keys continue to work."""
-        await act()
 
     def on_key(self, _event: Key) -> None:
         """Record that the operator is there."""
@@ -198,11 +175,21 @@ class ConsoleApp(ConsoleDisplay):
             told = "which one? move to the row of a stopped robot first" if stopped else "no robot is stopped"
             self.notify(told, severity="warning")
             return
-        self._open(LiftQuestion(meant, stop), lambda number: self._begin(partial(self._lift, meant, number)))
+        self._open(LiftQuestion(meant, stop), lambda number: self._begin(partial(self._lift, {meant: number})))
 
-    async def _lift(self, robot: str, number: int) -> None:
-        if not await self._session.lift_stop(robot, number):
-            self.notify(f"{robot} stays stopped: see the alarms", severity="warning")
+    def action_lift_own(self) -> None:
+        """Show the robots that this operator alone has stopped, and lift these stops if a different key confirms."""
+        own = own_stops(self._view.robots) if self._view is not None else {}
+        if own:
+            self._open(OwnLiftQuestion(own), lambda stops: self._begin(partial(self._lift, stops)))
+        else:
+            self.notify("you alone have stopped no robot", severity="warning")
+
+    async def _lift(self, stops: Mapping[str, int]) -> None:
+        lifted = await asyncio.gather(*(self._session.lift_stop(*stop) for stop in stops.items()))
+        if stay := [robot for robot, is_lifted in zip(stops, lifted, strict=True) if not is_lifted]:
+            verb = "stays" if len(stay) == 1 else "stay"
+            self.notify(f"{', '.join(stay)} {verb} stopped: see the alarms", severity="warning")
         self.redraw()
 
     async def _stop_robot(self, robot: str) -> None:

@@ -7,7 +7,7 @@ dialogs, too, even while a line is typed.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Generic, TypeVar
 
@@ -19,6 +19,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from backbone.spoken import counted
 from ui_console.model.arc_abilities import RoleCommand
 from ui_console.model.driving import GiveWish
 from ui_console.model.fields import WrongValue, default_text, read_fields
@@ -305,3 +306,30 @@ class LiftQuestion(Dialog[int]):
 
     def _text(self) -> Text:
         return Text("\n".join([*lift_lines(self._stop), "", "l: lift it   escape: leave it stopped"]))
+
+
+class OwnLiftQuestion(Dialog[Mapping[str, int]]):
+    """Ask whether to lift all stops that only this operator set; the answer is the stops in question.
+
+    A robot that was stopped again since the dialog opened has another number, and stays stopped.
+
+    Args:
+        stops: Robot → number of its stop.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("l", "lift", "lift them")]
+
+    def __init__(self, stops: Mapping[str, int]) -> None:
+        super().__init__()
+        self._stops = stops
+
+    def compose(self) -> ComposeResult:
+        """Lay out the question."""
+        with Vertical() as box:
+            box.border_title = f"lift your {counted(len(self._stops), 'stop')}?"
+            keys = "l: lift all of them   escape: leave them stopped"
+            yield Static(Text(f"{keys}\n\nbehaviors move these robots at once: {', '.join(self._stops)}"))
+
+    def action_lift(self) -> None:
+        """Answer."""
+        self.answer(self._stops)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import msgspec
 from rich.text import Text
+from textual import work
 from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
@@ -40,6 +41,9 @@ LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after wh
 NO_PICTURES = "no pictures: this kind of ARC has no camera or no framegrabber"
 UNANSWERED = "the pad let go: the terminal did not answer for a second. Press anew, and keep the mouse moving."
 NARROW_COLUMNS = 70  # chosen: below, picture and tables side by side are both too small
+
+
+A = TypeVar("A")
 
 
 class ConsoleDisplay(EndingApp):
@@ -214,6 +218,33 @@ class ConsoleDisplay(EndingApp):
         elif (abilities := self._view.abilities) is not None and not abilities.gives_pictures:
             remark = NO_PICTURES
         main.query_one(Video).look(remark)
+
+    def _open(self, dialog: Dialog[A], answered: Callable[[A], object] | None = None, *, stale: str = "") -> None:
+        """Open a dialog; a key held at its opening or closing does not drive until it was released.
+
+        Args:
+            answered: Called with its answer.
+            stale: Message to show instead of the answer if the robot was stopped, freed, granted or lost meanwhile.
+        """
+
+        def closed(answer: A | None) -> None:
+            has_changed = self._session.model.moment != opened_at
+            self._session.require_let_go()
+            if answered is None or answer is None:
+                return
+            if stale and has_changed:
+                self.notify(stale, severity="warning")
+            else:
+                answered(answer)
+
+        self._session.require_let_go()
+        opened_at = self._session.model.moment
+        self.push_screen(dialog, closed)
+
+    @work
+    async def _begin(self, act: Callable[[], Awaitable[object]]) -> None:
+        """Run this in a task, so that keys continue to work."""
+        await act()
 
     def _main(self) -> Screen[object] | None:
         """Return the screen behind all dialogs; None while it is being closed."""

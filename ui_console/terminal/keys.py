@@ -13,7 +13,7 @@ from rich.text import Text
 from textual.binding import Binding
 
 from ui_console.model.profile import Profile
-from ui_console.model.views import ConsoleView
+from ui_console.model.views import ConsoleView, RobotView
 
 MOST_PICKED_BY_KEY = 9
 STOP_KEYS = frozenset({"x", "X"})
@@ -31,6 +31,7 @@ KEYS = [
     Binding("x,alt+x", "stop_robot", "EMERGENCY STOP of your robot, or of the row's", priority=True),
     Binding("X,shift+x,alt+shift+x", "stop_all", "EMERGENCY STOP of all robots", priority=True),
     Binding("c", "lift", "lift a stop: says whose it is, and asks again"),
+    Binding("C", "lift_own", "lift all stops that you alone set: says how many, and asks again"),
     *DRIVE_KEYS,
     Binding("space,escape", "stop", "stop the wheels now"),
     Binding("enter", "take_or_release", "take the robot, or give it back"),
@@ -91,7 +92,7 @@ DRIVES = frozenset(
     }
 )
 """Actions of consoles that may drive."""
-STOPS = frozenset({"stop_robot", "stop_all", "lift", "decide"})
+STOPS = frozenset({"stop_robot", "stop_all", "lift", "lift_own", "decide"})
 """Actions of every console: stop, lift, and answer another operator who wants to lift."""
 PENDANT_DOES = STOPS | {"drive", "stop", "take_or_release", "keys", "quit", "interrupt"}
 """Four keys to drive, one to stop the wheels, one to take and release, and the keys of the emergency stop."""
@@ -145,6 +146,11 @@ def stop_meant(stopped: Sequence[str], *, held: str, placed: str, wanted: str, s
     return meant or (stopped[0] if len(stopped) == 1 else "")
 
 
+def own_stops(robots: Iterable[RobotView]) -> dict[str, int]:
+    """Return the robots that this operator alone has stopped, each with the number of its stop."""
+    return {one.robot: one.stop.number for one in robots if one.stop is not None and one.stop.is_mine}
+
+
 @dataclass(frozen=True)
 class Hint:
     """A key that the last line names.
@@ -179,6 +185,8 @@ def hints(view: ConsoleView, profile: Profile, meant: str) -> list[Hint]:
     found.append(Hint("X", "STOP ALL", "stop_all", 9, STOP_STYLE))
     if any(robot.stop is not None for robot in view.robots):
         found.append(Hint("c", "lift a stop", "lift", 8))
+    if len(own := own_stops(view.robots)) > 1:
+        found.append(Hint("C", f"lift your {len(own)}", "lift_own", 7))
     if view.own.consent is not None:
         found += [Hint("g", "yes", "decide(True)", 8), Hint("n", "no", "decide(False)", 8)]
     if profile is not Profile.MONITOR:

@@ -43,6 +43,7 @@ async def test_every_key_does_what_it_says() -> None:
 
 def test_every_key_the_console_knows_is_tried_here() -> None:
     elsewhere = {
+        "C",
         "M",
         "plus",
         "equals_sign",

@@ -7,7 +7,7 @@ import asyncio
 import msgspec
 import pytest
 from bursts import burst
-from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model
+from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model, rc
 from examples import some
 from known_arcs import lit_types
 from screen_text import screen_text
@@ -16,6 +16,7 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 from written_session import WrittenSession, settle
 
+from resource_pool.arc_client import Stopper
 from ui_console.model.arc_abilities import arc_abilities
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import AbilitiesKnown, Asked, Heard
@@ -37,6 +38,7 @@ DIALOGS: dict[str, list[str]] = {
     "fields of a command": ["o", "down", "enter"],
     "parameter": [*["tab"] * 6, "e"],
     "lift": ["c"],
+    "lift of one's own stops": ["C"],
 }
 """What is in front, and the keys that bring it there."""
 
@@ -120,7 +122,10 @@ async def test_a_stop_pressed_twice_lifts_nothing(name: str) -> None:
     assert not [one for one in session.wanted if isinstance(one, tuple) and one[0] == "lift"]
 
 
-@pytest.mark.parametrize("keys", [["c", "c"], ["c", "enter"], ["c", "space"], ["c", "x", "c"], ["c", "y"], ["l"]])
+@pytest.mark.parametrize(
+    "keys",
+    [["c", "c"], ["c", "enter"], ["c", "space"], ["c", "x", "c"], ["c", "y"], ["l"], ["C", "C"], ["C", "x", "C"]],
+)
 async def test_no_key_pressed_twice_lifts_a_stop(keys: list[str]) -> None:
     session = WrittenSession(shown=stopped_model())
     async with ConsoleApp(session).run_test(size=SIZE) as pilot:
@@ -189,6 +194,41 @@ async def test_a_lift_that_was_not_granted_is_said_aloud() -> None:
         await settle(pilot)
         await pilot.pause()
         assert "scout1 stays stopped" in screen_text(pilot.app)
+
+
+def crowd_stopped() -> WrittenSession:
+    """Return the session of anna, who has stopped all of twelve robots, scout5 together with ben."""
+    names = [f"scout{number}" for number in range(1, 13)]
+    robots = msgspec.structs.replace(SCHEDULE, rcs=[rc(name, "scout", []) for name in names])
+    stops = {name: msgspec.structs.replace(STOP, rc=name, number=number) for number, name in enumerate(names, 1)}
+    stops["scout5"] = msgspec.structs.replace(stops["scout5"], also=[Stopper("ben", "ui_console/console-2")])
+    return WrittenSession(Heard(8.0, robots), *(Heard(11.0, stop) for stop in stops.values()))
+
+
+@pytest.mark.parametrize("profile", list(Profile))
+async def test_an_operator_lifts_all_stops_of_his_own_by_one_question_and_no_other_stop(profile: Profile) -> None:
+    session = crowd_stopped()
+    async with ConsoleApp(session, profile=profile).run_test(size=SIZE) as pilot:
+        await settle(pilot)
+        assert "C lift your 11" in " ".join(screen_text(pilot.app).split())
+        await pilot.press("C")
+        await settle(pilot)
+        assert "lift your 11 stops?" in screen_text(pilot.app)
+        assert session.wanted == []
+        await pilot.press("l")
+        await settle(pilot)
+    assert session.wanted == [("lift", f"scout{number}", number) for number in range(1, 13) if number != 5]
+
+
+async def test_who_has_stopped_no_robot_alone_has_no_stops_to_lift_at_once() -> None:
+    session = WrittenSession(Heard(8.0, SCHEDULE), Heard(11.0, msgspec.structs.replace(STOP, by="ben")))
+    async with ConsoleApp(session).run_test(size=SIZE, notifications=True) as pilot:
+        await settle(pilot)
+        await pilot.press("C", "l")
+        await settle(pilot)
+        await pilot.pause()
+        assert "you alone have stopped no robot" in screen_text(pilot.app)
+    assert session.wanted == []
 
 
 async def test_where_no_robot_is_stopped_lifting_says_so() -> None:

@@ -50,6 +50,7 @@ export class Cards {
     for (const robot of robots) {
       const card = this.cards.get(robot.robot) ?? this.add(robot.robot);
       card.fill(robot, own, drawn[robot.robot]);
+      card.offer(robots.filter((one) => one.stop?.is_mine));
     }
     const wanted = [own.robot, this.chosen].find((name) => name !== undefined && names.includes(name));
     this.enlarge(wanted ?? names[0] ?? "");
@@ -112,7 +113,10 @@ export class Cards {
 
   /** Ignore a button that is held down on a card. */
   letGo() {
-    for (const card of this.cards.values()) card.dropLift();
+    for (const card of this.cards.values()) {
+      card.dropLift();
+      card.dropLiftOwn();
+    }
   }
 
   /** The connection ended: this page no longer knows the robots' holders. */
@@ -149,7 +153,14 @@ class Card {
     this.dropLift = actWhenHeld(this.lift, () => {
       if (this.stop) this.act("lift", this.name, { number: this.stop.number });
     });
-    this.standing.append(this.whose, this.lift, this.needs);
+    this.liftOwn = make("button", "lift-own");
+    this.liftOwn.type = "button";
+    /** @type {RobotView[]} */
+    this.ownStops = [];
+    this.dropLiftOwn = actWhenHeld(this.liftOwn, () => {
+      for (const { robot, stop } of this.ownStops) this.act("lift", robot, { number: stop?.number });
+    });
+    this.standing.append(this.whose, this.lift, this.liftOwn, this.needs);
     this.screen.root.append(this.makeEnlarge(), this.standing);
     const top = make("div", "top");
     const title = make("h2", "", name);
@@ -230,6 +241,19 @@ class Card {
     set(this.whose, `STOPPED by ${whom}${lasting(stop.age_s)}${stop.reason ? `: ${stop.reason}` : ""}${unsure}`);
     set(this.needs, stop.lift_line === HOLD ? "" : stop.lift_line);
     this.lift.setAttribute("aria-label", `Hold to lift the stop of ${this.name} by ${whom}`);
+  }
+
+  /**
+   * Offer to lift all stops that only this operator set, if this card has one of them and there are more.
+   *
+   * @param {RobotView[]} ownStops Robots with such a stop.
+   */
+  offer(ownStops) {
+    const numbers = (/** @type {RobotView[]} */ of) => of.map(({ robot, stop }) => `${robot} ${stop?.number}`).join();
+    if (numbers(ownStops) !== numbers(this.ownStops)) this.dropLiftOwn(); // the held button was meant for other stops
+    this.ownStops = ownStops;
+    this.liftOwn.hidden = !this.stop?.is_mine || ownStops.length < 2;
+    set(this.liftOwn, `Hold to lift your ${ownStops.length} stops`);
   }
 
   /** @param {number} now */
