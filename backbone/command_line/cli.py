@@ -40,6 +40,7 @@ from backbone.command_line.options import (
     shown_name,
 )
 from backbone.command_line.recording_commands import compare, record, recording, replay
+from backbone.command_line.standard_streams import can_redraw
 from backbone.command_line.tool_commands import bridge, metrics
 from backbone.command_line.tree_commands import tree
 from backbone.command_line.where import Where
@@ -168,7 +169,7 @@ def up(
         from backbone.launcher.detached import up_detached
 
         raise typer.Exit(up_detached(description.name, mission_file, options))
-    live = not headless and sys.stdout.isatty()
+    live = not headless and can_redraw()
     verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
     run(lambda: bring_up_on_console(description, options, live=live, verdict=verdict))
 

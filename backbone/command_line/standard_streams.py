@@ -14,6 +14,8 @@ from backbone.launcher.endings import ExitCode, say
 _STREAMS = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
 NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 HAS_ROOM = "Write it to a disk that has room."
+_ONLY_LINES = ("dumb", "unknown")
+"""Words of ``TERM`` for terminals that cannot place text, in lower case."""
 
 
 @contextlib.contextmanager
@@ -39,6 +41,11 @@ def standard_streams() -> Iterator[None]:
         if error.errno != errno.EPIPE:  # a reader that has stopped knows it
             say(f"the output cannot be written: {error.strerror} ({HAS_ROOM})")
         sys.exit(ExitCode.UNEXPECTED)
+
+
+def can_redraw() -> bool:
+    """Return whether standard output is a terminal that can draw a picture in the place of the one before."""
+    return sys.stdout.isatty() and os.environ.get("TERM", "").lower() not in _ONLY_LINES
 
 
 def _open_closed_ones() -> None:

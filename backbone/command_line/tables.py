@@ -8,6 +8,8 @@ from collections.abc import AsyncIterator
 from rich.console import Console, RenderableType
 from rich.live import Live
 
+from backbone.command_line.standard_streams import can_redraw
+from backbone.command_line.status import EVERY_S
 from backbone.operating_system.ending_signals import interruptible
 from backbone.picture.mission import MissionPicture
 from backbone.picture.screen import live_screen, screen
@@ -22,18 +24,21 @@ class MissionTables:
         width: Of tables; None: as the terminal.
     """
 
-    every_s = REDRAW_EVERY_S
-
     def __init__(self, width: int | None) -> None:
         self._console = console_of_width(width)
+        self.every_s = REDRAW_EVERY_S if can_redraw() else EVERY_S
 
     def show(self, picture: MissionPicture) -> None:
         """Print one."""
         print_on(self._console, screen(picture))
 
     async def keep_showing(self, pictures: AsyncIterator[MissionPicture]) -> None:
-        """Show each in the place of the one before, until there are no more."""
+        """Show each in the place of the one before, or below it in a file or pipe, until there are no more."""
         console = self._console
+        if not can_redraw():
+            async for picture in pictures:
+                self.show(picture)
+            return
         with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
             async for picture in pictures:
                 live.update(live_screen(picture, None, console.height), refresh=True)
