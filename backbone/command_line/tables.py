@@ -12,7 +12,7 @@ from backbone.command_line.standard_streams import can_redraw
 from backbone.command_line.status import EVERY_S
 from backbone.operating_system.ending_signals import interruptible
 from backbone.picture.mission import MissionPicture
-from backbone.picture.screen import live_screen, screen
+from backbone.picture.screen import live_screen, screen, summary
 
 REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds
 
@@ -29,8 +29,11 @@ class MissionTables:
         self.every_s = REDRAW_EVERY_S if can_redraw() else EVERY_S
 
     def show(self, picture: MissionPicture) -> None:
-        """Print one."""
-        print_on(self._console, screen(picture))
+        """Print one; if it is longer than the terminal, its first lines also at the end, where a person sees them."""
+        console = self._console
+        print_on(console, screen(picture))
+        if console.is_terminal and len(picture.components) > console.height:
+            print_on(console, summary(picture))
 
     async def keep_showing(self, pictures: AsyncIterator[MissionPicture]) -> None:
         """Show each in the place of the one before, or below it in a file or pipe, until there are no more."""

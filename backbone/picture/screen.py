@@ -167,12 +167,17 @@ def _event_line(event: StoryEvent) -> Text:
     return Text.assemble((f"{event.at_s:8.2f} s  ", "dim"), f"{event.subject:22.22s} ", (event.what, style))
 
 
-def screen(picture: MissionPicture) -> RenderableType:
-    """Return the whole picture: health and absences first, then components, holders, schedule."""
+def summary(picture: MissionPicture) -> RenderableType:
+    """Return the health, with absences and stops in force."""
     troubles = _troubles(picture)
     for line in troubles:
         line.no_wrap = False
-    parts: list[RenderableType] = [_head(picture), *troubles]
+    return Group(_head(picture), *troubles)
+
+
+def screen(picture: MissionPicture) -> RenderableType:
+    """Return the whole picture: health and absences first, then components, holders, schedule."""
+    parts = [summary(picture)]
     if picture.components:
         parts.append(_components_table(picture))
     if (schedule := picture.people.named_all(picture.schedule)) is not None:
