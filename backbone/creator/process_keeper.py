@@ -100,7 +100,7 @@ class ProcessKeeper:
         self._kept = KeptComponents()
         self._tasks: set[asyncio.Task[None]] = set()
         self._signs = SignsOfLife(read_vitals)
-        self._zygote_trouble, self._zygote_trouble_since_s = "", 0.0
+        self._zygote_trouble, self._zygote_trouble_since_s, self._zygote_busy_s = "", 0.0, 0.0
         self._looking: asyncio.Task[None] | None = None
         self._alarm = Alarm(self._clock, self._task, self._woken, "supervision's alarm")
         self._is_closing = False
@@ -276,20 +276,22 @@ class ProcessKeeper:
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
             now_s = self._now_s()
             pids = {one.pid for one in self._supervision if one.pid} | self._shared.pids()
+            before_s, self._zygote_busy_s = self._zygote_busy_s, self._zygote.busy_s()
+            unreported_s = max(0.0, self._zygote_busy_s - before_s)  # it reports an end when it has time for it
             for sign in self._signs.look(run_directory, pids, now_s):
                 if sign.hangs:
                     self._zygote.kill(sign.pid, WRITE_STACKS)
-                self._observed(sign, now_s)
+                self._observed(sign, now_s, max(sign.late_s, unreported_s))
             trouble = self._zygote.keep_running()
             if trouble != self._zygote_trouble:
                 self._zygote_trouble, self._zygote_trouble_since_s = trouble, now_s
                 self.on_changed()
 
-    def _observed(self, sign: Sign, now_s: float) -> None:
-        self._shared.observed(sign.pid, sign.silent_s, now_s, sign.late_s)
+    def _observed(self, sign: Sign, now_s: float, late_s: float) -> None:
+        self._shared.observed(sign.pid, sign.silent_s, now_s, late_s)
         for one in [one for one in self._supervision if one.pid == sign.pid]:
             if sign.beats or one.phase is not Phase.READY:  # a ready process without a beat could not create its file
-                self._carry_out(self._supervision.observed(one.name, sign.silent_s, now_s, sign.late_s))
+                self._carry_out(self._supervision.observed(one.name, sign.silent_s, now_s, late_s))
 
     def _exited(self, pid: int, returncode: int) -> None:
         self._signs.forget(pid)

@@ -44,9 +44,11 @@ class SignsOfLife:
         self._doing: dict[int, str] = {}
 
     def look(self, run_directory: str, pids: Iterable[int], now_s: float) -> Iterator[Sign]:
-        """Yield the sign of each of these processes that has vitals."""
+        """Yield the sign of each of these processes; one that has ended, which is not reported yet, is not silent."""
         for pid in pids:
-            if (vitals := self._read_vitals(run_directory, pid)) is not None:
+            if (vitals := self._read_vitals(run_directory, pid)) is None:
+                yield Sign(pid, 0.0, 0.0, beats=False, hangs=False)
+            else:
                 self._doing[pid] = vitals.doing
                 silence, beats = self._silences.setdefault(pid, Silence()), vitals.beats > 0
                 before_s = silence.silent_s

@@ -66,6 +66,9 @@ class Forks(Protocol):
     def keep_running(self) -> str:
         """Continue the zygote if it was stopped; return the fault, empty: none."""
 
+    def busy_s(self) -> float:
+        """Return for how many seconds the zygote has run or waited for a processor since its start."""
+
     async def close(self) -> None:
         """End the zygote and everything it forked."""
 
@@ -160,6 +163,10 @@ class Zygote:
         log.warning("zygote %d was stopped and is continued", self._body.pid)
         processes.send([self._body.pid], signal.SIGCONT)
         return "the zygote was stopped"
+
+    def busy_s(self) -> float:
+        """Return for how many seconds the zygote has run or waited for a processor since its start."""
+        return sum(processes.processor_times_s(self._body.pid) or (0.0, 0.0))
 
     async def close(self) -> None:
         """End the zygote and all its components; return when they have ended. Idempotent."""

@@ -214,6 +214,10 @@ class SimulatedZygote:
         """Return no fault, because simulated zygotes are never paused."""
         return ""
 
+    def busy_s(self) -> float:
+        """Return zero, because simulated zygotes take no time."""
+        return 0.0
+
     def die(self) -> None:
         """Kill all components of this zygote."""
         for process in list(self._forked.values()):

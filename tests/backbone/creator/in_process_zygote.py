@@ -31,6 +31,7 @@ class InProcessZygote:
         forked: Names in the order in which they were forked.
         wrote_stacks: Pids in the order in which they were ordered to write their stacks.
         refuses: Why there is no further process; empty: there is one.
+        was_busy_s: For how long it was busy.
     """
 
     def __init__(self, network: LocalNetwork) -> None:
@@ -40,6 +41,7 @@ class InProcessZygote:
         self.forked: list[str] = []
         self.wrote_stacks: list[int] = []
         self.refuses = ""
+        self.was_busy_s = 0.0
         self._network, self._next_pid = network, 1000
         self._tasks: dict[int, asyncio.Task[None]] = {}
 
@@ -72,6 +74,9 @@ class InProcessZygote:
 
     def keep_running(self) -> str:
         return ""
+
+    def busy_s(self) -> float:
+        return self.was_busy_s
 
     async def close(self) -> None:
         for pid in list(self.lives):

@@ -215,6 +215,21 @@ def test_a_start_without_a_process_fails_with_the_reason(on_bench: Callable) -> 
     on_bench(body)
 
 
+def test_nothing_is_signalled_because_its_end_is_reported_late_by_a_busy_zygote(on_bench: Callable) -> None:
+    """On a full machine processes had ended, and their ends were reported seconds later."""
+
+    async def body(bench: Bench) -> None:
+        await bench.start("Stubborn", "scout1")
+        ending, began_s = asyncio.create_task(bench.keeper.end("scout1", "over", 1.5, 0.5)), now_s()
+        for _ in range(20):
+            await VirtualClock().sleep_s(LOOK_EVERY_S)
+            bench.zygote.was_busy_s += LOOK_EVERY_S
+        assert (await ending).by is EndedBy.SIGKILL
+        assert now_s() == pytest.approx(began_s + 20 * LOOK_EVERY_S + 2.0, abs=2 * LOOK_EVERY_S)
+
+    on_bench(body)
+
+
 def test_end_says_what_it_took(on_bench: Callable) -> None:
     async def body(bench: Bench) -> None:
         await bench.start("Quiet", "obeys")

@@ -36,6 +36,9 @@ class ZygoteWithABug:
     def keep_running(self) -> str:
         return ""
 
+    def busy_s(self) -> float:
+        return 0.0
+
     async def close(self) -> None: ...
 
 
