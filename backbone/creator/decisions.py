@@ -1,4 +1,4 @@
-"""Instructions: decisions of supervision, which the process keeper carries out in order."""
+"""Instructions: decisions of supervision, which the process keeper carries out in order; the words for an end."""
 
 from __future__ import annotations
 
@@ -110,3 +110,18 @@ Instruction = (
     | ReportSilent
     | SupervisionWakesAt
 )
+
+
+def describe(returncode: int, cause: str = "") -> str:
+    """Return how a process ended, for people.
+
+    Example:
+        >>> describe(1, "ValueError: no picture"), describe(-9)
+        ('exit code 1: ValueError: no picture', 'killed by SIGKILL')
+    """
+    if returncode >= 0:
+        return f"exit code {returncode}{cause and ': '}{cause}"
+    try:
+        return f"killed by {signal.Signals(-returncode).name}"
+    except ValueError:
+        return f"killed by signal {-returncode}"

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from backbone.component.launch import Launch
 from backbone.component.logs import log_path
 from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED, cause_in_log, refusal_in_log
+from backbone.creator.decisions import describe
 from backbone.creator.messages import StartFailed
-from backbone.creator.supervision import describe
 from backbone.errors import code_of
 from backbone.printable_text import printable
 

@@ -23,7 +23,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from backbone.creator.supervision import TERM_S, describe
+from backbone.creator.decisions import describe
+from backbone.creator.supervision import TERM_S
 
 SERVES_WITHIN_S = 10.0  # chosen: of silence; a session opens within 15 ms, or fails after 5 s
 ADMITS_WITHIN_S = 5.0  # chosen: of silence; an answer takes a millisecond

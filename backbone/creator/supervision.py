@@ -44,6 +44,7 @@ from backbone.creator.decisions import (
     ReportStartFailed,
     SendSignal,
     SupervisionWakesAt,
+    describe,
 )
 from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHere, RestartPolicy
 from backbone.creator.silence import SHOWN_AFTER_S
@@ -391,18 +392,3 @@ def _by(end: _End, returncode: int) -> EndedBy:
     if end.stage is EndedBy.ASKING and (end.not_heard or returncode != 0):
         return EndedBy.ITSELF
     return end.stage
-
-
-def describe(returncode: int, cause: str = "") -> str:
-    """Return how a process ended, for people.
-
-    Example:
-        >>> describe(1, "ValueError: no picture"), describe(-9)
-        ('exit code 1: ValueError: no picture', 'killed by SIGKILL')
-    """
-    if returncode >= 0:
-        return f"exit code {returncode}{cause and ': '}{cause}"
-    try:
-        return f"killed by {signal.Signals(-returncode).name}"
-    except ValueError:
-        return f"killed by signal {-returncode}"

@@ -18,9 +18,10 @@ from backbone.creator.decisions import (
     ReportStartFailed,
     SendSignal,
     SupervisionWakesAt,
+    describe,
 )
 from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, RestartPolicy
-from backbone.creator.supervision import FIRST_STARTS, LEAVE_S, TERM_S, Supervision, describe
+from backbone.creator.supervision import FIRST_STARTS, LEAVE_S, TERM_S, Supervision
 
 
 def running(policy: RestartPolicy | None = None, *, asked_by_signal: bool = False) -> Supervision:
