@@ -49,18 +49,22 @@ class TraceWriter:
         for rc in rcs:
             self.introduce_rc(rc)
         self.introduce_nodes(arc.path)
-        name, number = arc.path[-1]
-        is_console = name.startswith(CONSOLE)
         self.record(
             "request",
             f"asked by {arc.request.owner}",
             arc=arc.name,
-            owner={"ui": number, "id": name.removeprefix(CONSOLE)} if is_console else self._id(arc.place_in_tree),
+            owner=self._owner(arc),
             min_run=arc.minimum_s,
             max_run=arc.maximum_s,
             use={name: _streams(use.streams) if name in arc.shares else EXCLUSIVE for name, use in arc.uses.items()},
             **({"idle": True} if idle else {}),
         )
+
+    def _owner(self, arc: ArcEntry) -> str | dict[str, object]:
+        if not _of_console(arc.path):
+            return self._id(arc.place_in_tree)
+        [(name, number)] = arc.path
+        return {"ui": number, "id": name.removeprefix(CONSOLE)}
 
     # Names.
 
@@ -101,7 +105,7 @@ class TraceWriter:
             way = (*way, name)
             told = self._nodes.get(way)
             self._nodes[way] = (parent, number)
-            if told == (parent, number) or (told is None and name.startswith(CONSOLE)):
+            if told == (parent, number) or (told is None and _of_console(path)):
                 continue  # the request's line has a console's first number
             moved = told is not None and told[0] != parent
             cause = f"its parent is {parent}" if moved else f"its priority among its siblings is {number}"
@@ -133,6 +137,11 @@ class TraceWriter:
     def says_up(self, rc: str) -> bool | None:
         """Return whether the RC is up according to the lines so far; None without such a line."""
         return self._is_up.get(rc)
+
+
+def _of_console(path: Path) -> bool:
+    """Return whether this is the path of a console itself, not of an order of a console."""
+    return len(path) == 1 and path[0][0].startswith(CONSOLE)
 
 
 def _streams(streams: Collection[Usage]) -> list[dict[str, float]]:

@@ -101,6 +101,20 @@ def test_s7_s8_a_console_overrides_at_once_only_if_it_is_higher(priority, starts
     assert bench.verdict() == []
 
 
+def test_an_order_has_the_priority_of_its_console_in_the_trace_too():
+    """Its own number counts only among the orders of this console; the number of the mission's node is 0."""
+    bench = Bench(manager(), *UNITS)
+    bench.tell(ask("b", "v s1"))
+    order = ask("anna-order-1-drive", "v s1", path=[("anna", 100), ("anna-order-1", -1)], console=True)
+    bench.at(2.0, order)
+    bench.at(3.0, ask("anna-drive", "v s1", path=[("anna", 100)], console=True))
+    bench.at(4.0, Departed("anna-drive"))
+    bench.at(5.0, Departed("anna-order-1-drive"))
+    bench.run(20.0)
+    assert bench.runs("b") == [(0, 2), (5, None)]
+    assert bench.verdict() == []
+
+
 def test_s9_each_group_switches_on_its_own_clock():
     a, b = ask("a", "v"), ask("b", "v")
     c, d = ask("c", "w", run_s=3.0), ask("d", "w", run_s=3.0)
