@@ -3,8 +3,8 @@
 ``Stick`` is pure: events of the device go in, positions of the stick come out. ``play_gamepad`` is the loop around it.
 The device is read through evdev, which is an extra (``pip install 'scout-backbone[gamepad]'``, Linux only).
 
-A gamepad reports the release of a button. But a gamepad that is unplugged or out of range reports nothing; therefore
-the drive command is repeated every ``SAY_EVERY_S`` and expires by itself.
+A gamepad reports the release of a button. A gamepad that is held still reports nothing, so its last position counts
+until the system reports that the gamepad is gone; the drive command is repeated every ``SAY_EVERY_S`` meanwhile.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from enum import StrEnum
 from typing import Protocol
 
+from backbone.bus.interface import Clock
 from backbone.errors import Refusal
 from backbone.waiting import end_tasks, set_within
 from ui_console.model.driving import STICK_LASTS_S
@@ -33,6 +34,7 @@ BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_WEST, BTN_TL, BTN_TR, BTN_SELECT, BTN_START 
 DEAD_MAN = frozenset({BTN_TL, BTN_TR})
 STILL_ZONE = 0.12  # chosen: released sticks rest within a tenth of their middle
 SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``; machine seconds
+FIND_EVERY_S = 1.0  # chosen: finds a gamepad soon after it was switched on again
 
 
 class PadWish(StrEnum):
@@ -86,6 +88,10 @@ class Gamepad(Protocol):
         """Yield its events; raise ``OSError`` when it is gone."""
 
 
+FoundGamepad = tuple[Gamepad, Mapping[int, tuple[int, int]]]
+"""An open gamepad, and the least and largest value of each axis of its stick."""
+
+
 class Stick:
     """Turns events of the device into positions of the stick.
 
@@ -125,8 +131,8 @@ class Stick:
         return (-self._at[ABS_Y], self._at[ABS_X]) if self._held else None
 
 
-def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
-    """Return the first gamepad of this machine and the ranges of its stick.
+def find_gamepad() -> FoundGamepad:
+    """Return the first gamepad of this machine.
 
     Raises:
         NoGamepad: There is no gamepad, or none can be read.
@@ -144,6 +150,15 @@ def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
             return device, axes
         device.close()
     raise NoGamepad("no device under /dev/input has a stick and a shoulder button")
+
+
+async def wait_gamepad(clock: Clock, find: Callable[[], FoundGamepad]) -> FoundGamepad:
+    """Wait until a gamepad is there, and return it; ``find`` is called in a thread."""
+    while True:
+        try:
+            return await asyncio.to_thread(find)
+        except NoGamepad:
+            await clock.sleep_s(FIND_EVERY_S)
 
 
 async def play_gamepad(

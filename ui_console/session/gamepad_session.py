@@ -6,7 +6,7 @@ For an operator who wears the console (000, Fig. 3), or for a small machine besi
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import assert_never
 
 from backbone.bus.interface import Clock
@@ -18,7 +18,15 @@ from ui_console.model.events import ConsoleEvent
 from ui_console.model.orders import Order, OrderKind
 from ui_console.model.state_lines import news, state_lines
 from ui_console.model.team import TeamModel
-from ui_console.session.gamepad import Gamepad, NoGamepad, PadWish, Stick, buttons_help, find_gamepad, play_gamepad
+from ui_console.session.gamepad import (
+    FoundGamepad,
+    PadWish,
+    Stick,
+    buttons_help,
+    find_gamepad,
+    play_gamepad,
+    wait_gamepad,
+)
 from ui_console.session.joining import end_on_signals, join, line_writer
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.session.verbs import Session
@@ -26,8 +34,6 @@ from ui_console.session.verbs import Session
 LIFT_REMEDY = "When the robot may move, lift the stop at a console with a screen."
 SPEED = 1.0  # chosen: a share of the robot's largest speed; the stick gives a share of that
 LOOK_EVERY_S = 0.25  # chosen: a change is printed soon
-FIND_EVERY_S = 1.0  # chosen: finds a gamepad soon after it was switched on again
-FoundGamepad = tuple[Gamepad, Mapping[int, tuple[int, int]]]
 
 
 class GamepadSession(Session):
@@ -94,15 +100,8 @@ class GamepadSession(Session):
             )
             self.release()
             self._write("the gamepad is gone: you give the robot back")
-            gamepad = await self._found_again(clock)
+            gamepad = await wait_gamepad(clock, self._find)
             self._write("the gamepad is there again: start takes the robot")
-
-    async def _found_again(self, clock: Clock) -> FoundGamepad:
-        while True:
-            try:
-                return await asyncio.to_thread(self._find)
-            except NoGamepad:
-                await clock.sleep_s(FIND_EVERY_S)
 
     def _begin_wish(self, wish: PadWish) -> None:
         self.touch()

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine
 from typing import assert_never
 
 from textual import pilot as textual_pilot
 
+from backbone.bus.interface import Clock
 from backbone.launcher.endings import ExitCode
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
@@ -17,7 +18,7 @@ from ui_console.model.events import ConsoleEvent
 from ui_console.model.orders import Order, OrderKind
 from ui_console.model.profile import Profile
 from ui_console.model.team import TeamModel
-from ui_console.session.gamepad import Gamepad, PadWish, Stick, play_gamepad
+from ui_console.session.gamepad import FoundGamepad, PadWish, Stick, find_gamepad, play_gamepad, wait_gamepad
 from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.session.verbs import Session
@@ -39,7 +40,8 @@ class TerminalSession(Session):
         profile: Appearance of the screen.
         is_bare: True to begin with the picture alone.
         sees: True if pictures are expected.
-        gamepad: Gamepad and the ranges of its stick.
+        gamepad: Also drives.
+        find: Finds the gamepad again after it disappeared.
     """
 
     def __init__(
@@ -51,10 +53,11 @@ class TerminalSession(Session):
         profile: Profile = Profile.TERMINAL,
         is_bare: bool = False,
         sees: bool = True,
-        gamepad: tuple[Gamepad, Mapping[int, tuple[int, int]]] | None = None,
+        gamepad: FoundGamepad | None = None,
+        find: Callable[[], FoundGamepad] = find_gamepad,
     ) -> None:
         super().__init__(ConsoleModel(name, user, TeamModel(mission, LIFT_REMEDY), sees=sees))
-        self._profile, self._is_bare, self._gamepad = profile, is_bare, gamepad
+        self._profile, self._is_bare, self._gamepad, self._find = profile, is_bare, gamepad, find
 
     def show(self, event: ConsoleEvent) -> None:
         """Apply an event to the model; the screen shows it at its next redraw."""
@@ -90,7 +93,7 @@ class TerminalSession(Session):
         )
         living = asyncio.create_task(console.run(), name="console")
         living.add_done_callback(lambda _living: screen.exit())
-        playing = asyncio.create_task(self._play_gamepad(screen), name="gamepad")
+        playing = asyncio.create_task(self._play_gamepad(screen, console.clock), name="gamepad")
         try:
             if pilot is None:
                 await on_terminal(screen, console.end)
@@ -105,17 +108,19 @@ class TerminalSession(Session):
                 playing.result()
         return ExitCode(screen.return_code or ExitCode.DONE)
 
-    async def _play_gamepad(self, screen: ConsoleApp) -> None:
-        if self._gamepad is None:
-            return
-        device, ranges = self._gamepad
-        await play_gamepad(
-            device,
-            Stick(ranges),
-            hold=lambda forward, right, lasts_s: self.steer(forward, right, screen.speed, lasts_s),
-            stop=self.stop,
-            wish=lambda wish: self._begin_wish(wish, screen),
-        )
+    async def _play_gamepad(self, screen: ConsoleApp, clock: Clock) -> None:
+        while self._gamepad is not None:
+            device, ranges = self._gamepad
+            await play_gamepad(
+                device,
+                Stick(ranges),
+                hold=lambda forward, right, lasts_s: self.steer(forward, right, screen.speed, lasts_s),
+                stop=self.stop,
+                wish=lambda wish: self._begin_wish(wish, screen),
+            )
+            screen.notify("the gamepad is gone: drive by keys", severity="warning")
+            self._gamepad = await wait_gamepad(clock, self._find)
+            screen.notify("the gamepad is there again")
 
     def _begin_wish(self, wish: PadWish, screen: ConsoleApp) -> None:
         self.touch()

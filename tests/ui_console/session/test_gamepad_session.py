@@ -27,9 +27,10 @@ from ui_console.session.gamepad import (
     BTN_TR,
     EV_ABS,
     EV_KEY,
+    FIND_EVERY_S,
     NoGamepad,
 )
-from ui_console.session.gamepad_session import FIND_EVERY_S, LIFT_REMEDY, GamepadSession
+from ui_console.session.gamepad_session import LIFT_REMEDY, GamepadSession
 from ui_console.session.teleoperation import Teleoperation
 
 RANGES = {ABS_Y: (-100, 100)}

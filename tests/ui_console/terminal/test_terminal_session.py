@@ -16,7 +16,7 @@ from backbone.bus.clock import MissionClock
 from backbone.component.messages import LifeState
 from backbone.launcher.endings import ExitCode
 from ui_console.model.events import Heard
-from ui_console.session.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
+from ui_console.session.gamepad import BTN_EAST, BTN_NORTH, EV_KEY, FoundGamepad
 from ui_console.session.observer import Observer
 from ui_console.terminal.dialogs import LiftQuestion
 from ui_console.terminal.keys import KEYS
@@ -84,6 +84,7 @@ class StopsAtOnce(StandIn):
     def __init__(self) -> None:
         super().__init__()
         self.stopped: list[str] = []
+        self.all_are_stopped = asyncio.Event()
 
     async def stop_robot(self, robot: str) -> bool:
         self.stopped.append(robot)
@@ -91,19 +92,22 @@ class StopsAtOnce(StandIn):
 
     async def stop_all(self) -> list[str]:
         self.stopped.append("all")
+        self.all_are_stopped.set()
         return []
 
 
 class OneButtonPad:
-    """A gamepad of which two buttons are pressed, one after the other."""
+    """A gamepad whose buttons are pressed, one after the other; then it rests, or it is unplugged."""
 
-    def __init__(self, codes: list[int]) -> None:
-        self._codes = codes
+    def __init__(self, codes: list[int], *, is_unplugged: bool = False) -> None:
+        self._codes, self._is_unplugged = codes, is_unplugged
 
     async def async_read_loop(self) -> AsyncIterator[Any]:
         for code in self._codes:
             await asyncio.sleep(0.3)
             yield SimpleNamespace(type=EV_KEY, code=code, value=1)
+        if self._is_unplugged:
+            raise OSError("No such device")
         await asyncio.Event().wait()
 
 
@@ -119,6 +123,26 @@ async def test_a_gamepads_buttons_stop_one_robot_and_all_with_a_dialog_in_front(
 
     await session.run(cast(Observer[Any], console), pilot=open_a_dialog)
     assert console.stopped == ["scout1", "all"]
+
+
+async def test_a_gamepad_that_is_unplugged_is_reported_and_works_again_when_it_is_back() -> None:
+    console, told, found = StopsAtOnce(), list[str](), [OneButtonPad([BTN_NORTH])]
+
+    def find() -> FoundGamepad:
+        return found.pop(), {}
+
+    session = TerminalSession("console-1", gamepad=(OneButtonPad([BTN_EAST], is_unplugged=True), {}), find=find)
+    session.model.robot = "scout1"
+
+    async def look(pilot: Pilot[Any]) -> None:
+        async with asyncio.timeout(10.0):
+            await console.all_are_stopped.wait()
+        told.extend(note.message for note in pilot.app._notifications)  # noqa: SLF001
+        await pilot.press("ctrl+q")
+
+    await session.run(cast(Observer[Any], console), pilot=look)
+    assert console.stopped == ["scout1", "all"]
+    assert told == ["the gamepad is gone: drive by keys", "the gamepad is there again"]
 
 
 def test_the_remedy_of_a_stop_names_the_keys_of_a_terminal() -> None:
