@@ -16,9 +16,8 @@ PARTS = {"recovery_observer", "stops_gamepad", "world_loads"}
 """Run by other programs."""
 JUDGES = {"stops", "unit_rates"}
 """Their exit codes judge the machine; ``stops`` has a test of its own."""
-LONG = {"bursts", "console", "idle", "recording", "recovery", "replay", "servoing", "trial", "web_console", "world"}
+LONG = {"console", "idle", "recording", "recovery", "replay", "servoing", "trial", "web_console", "world"}
 BRIEFLY = {
-    "admission": "--sets 20",
     "air": "--frames 20",
     "command_line": "--rounds 1",
     "command_path": "--seconds 1",
