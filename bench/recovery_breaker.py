@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import psutil
@@ -54,7 +54,7 @@ SHOWN = 5  # number of violations that are printed in full
 class Breaker:
     """Injects faults into a mission that is up, and reports the effects."""
 
-    def __init__(self, mission: BenchMission, patience_s: float = MENDED_WITHIN_S) -> None:
+    def __init__(self, mission: BenchMission, patience_s: float) -> None:
         self.mission, self.watch, self.patience_s = mission, mission.watch, patience_s
         self.struck: list[Fault] = []
 
@@ -82,20 +82,18 @@ class Breaker:
             raise NotSeen(f"{victim} does not run")
         return Fault(victim, name, pid, rows)
 
-    def strike(self, faults: Sequence[Fault]) -> None:
-        """Inject these faults."""
-        for fault in faults:
-            number = SIGNALS.get(fault.name, signal.SIGSTOP)
-            fault.at_s = time.monotonic()
-            self.struck.append(fault)
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(fault.pid, number)
-            if fault.kills:
-                fault.lifted_s = fault.at_s
-            if fault.victim.endswith("zygote") and fault.name == "SIGTERM":
-                time.sleep(POLL_S)
-                if any(process.pid == fault.pid for process in marked_of(self.mission)):
-                    fault.replaced_s = fault.at_s  # a zygote ignores the signal
+    def strike(self, fault: Fault) -> None:
+        """Inject the fault."""
+        fault.at_s = time.monotonic()
+        self.struck.append(fault)
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(fault.pid, SIGNALS.get(fault.name, signal.SIGSTOP))
+        if fault.kills:
+            fault.lifted_s = fault.at_s
+        if fault.victim.endswith("zygote") and fault.name == "SIGTERM":
+            time.sleep(POLL_S)
+            if any(process.pid == fault.pid for process in marked_of(self.mission)):
+                fault.replaced_s = fault.at_s  # a zygote ignores the signal
 
     def attend(self, fault: Fault) -> None:
         """Continue a stopped process when its time has come; check whether a zygote was replaced."""
@@ -112,26 +110,25 @@ class Breaker:
             if "rows" in look.sight and self.mission.zygote_of(keeper_pid, look) not in (0, fault.pid):
                 fault.replaced_s = now_s
 
-    def see_through(self, expected: Expected, faults: Sequence[Fault]) -> dict[str, Any]:
-        """Inject the faults, wait until the mission has lastingly recovered, and return the observations."""
+    def see_through(self, expected: Expected, fault: Fault) -> dict[str, Any]:
+        """Inject the fault, wait until the mission has lastingly recovered, and return the observations."""
         usual_gap_s = longest_gap_s(self.watch.pictures_s, expected.before.at_s - CALM_S, expected.before.at_s)
         more = len(marked_of(self.mission))
-        self.strike(faults)
-        judgement = Judgement(expected, faults)
+        self.strike(fault)
+        judgement = Judgement(expected, fault)
         while True:
             time.sleep(POLL_S)
-            for fault in faults:
-                self.attend(fault)
+            self.attend(fault)
             judgement.take(self.watch.looks, self.watch.pictures_s)
-            lifted_s, now_s = max(fault.lifted_s for fault in faults), time.monotonic()
+            lifted_s, now_s = fault.lifted_s, time.monotonic()
             if now_s > max(lifted_s, judgement.good_since_s) + STAYS_S or now_s > lifted_s + self.patience_s:
                 break
-        began_s, look = faults[0].at_s, self.watch.looks[-1]
+        look = self.watch.looks[-1]
         found: dict[str, Any] = {
             "noticed_s": rounded(judgement.noticed_after_s()),
             "healthy_s": rounded(judgement.healthy_after_s()),
             "unsaid_s": rounded(judgement.unsaid_s),
-            "gap_s": rounded(longest_gap_s(self.watch.pictures_s, began_s, time.monotonic())),
+            "gap_s": rounded(longest_gap_s(self.watch.pictures_s, fault.at_s, time.monotonic())),
             "usual_gap_s": rounded(usual_gap_s),
             "more": len(marked_of(self.mission)) - more,
         }
@@ -180,7 +177,7 @@ def rounded(seconds: float | None) -> float | None:
 
 
 @contextlib.contextmanager
-def breaker(patience_s: float = MENDED_WITHIN_S) -> Iterator[Breaker]:
+def breaker(patience_s: float) -> Iterator[Breaker]:
     """Bring a mission up and yield it when all is ready."""
     with mission_coming_up() as mission:
         ends_s = time.monotonic() + UP_WITHIN_S
@@ -189,10 +186,3 @@ def breaker(patience_s: float = MENDED_WITHIN_S) -> Iterator[Breaker]:
                 raise NotSeen("\n".join(["the mission did not come up", *mission.lines]))
             time.sleep(POLL_S)
         yield Breaker(mission, patience_s)
-
-
-@contextlib.contextmanager
-def breaking_calm() -> Iterator[tuple[Breaker, Expected]]:
-    """Yield a mission that is up, and its state without faults."""
-    with breaker() as breaking:
-        yield breaking, breaking.calm()

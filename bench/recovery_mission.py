@@ -184,13 +184,9 @@ class BenchMission:
         """Take the mission down by command."""
         return self.command("scout-backbone", "down")
 
-    def left(self, within_s: float = GONE_WITHIN_S) -> list[psutil.Process]:
-        """Return its remaining processes after at most this time."""
-        return wait_gone(self.environment[MARK], within_s)
-
-    def logs(self) -> dict[str, int]:
-        """Return the bytes of each log file."""
-        return {log.name: log.stat().st_size for log in sorted(self.directory.glob("log/*"))}
+    def left(self) -> list[psutil.Process]:
+        """Return its remaining processes after at most ``GONE_WITHIN_S``."""
+        return wait_gone(self.environment[MARK], GONE_WITHIN_S)
 
     def processes(self, look: Look) -> dict[str, int]:
         """Return victim, zygotes included → process; empty if the look has no rows."""

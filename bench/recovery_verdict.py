@@ -92,8 +92,8 @@ class Expected:
 class Judgement:
     """Judges each look once, as it arrives."""
 
-    def __init__(self, expected: Expected, faults: Sequence[Fault]) -> None:
-        self.expected, self.faults = expected, faults
+    def __init__(self, expected: Expected, fault: Fault) -> None:
+        self.expected, self.fault = expected, fault
         self.good_since_s = math.inf
         """Time since which the mission has been whole and its health ``ok``; infinite while it is not."""
         self.was_bad = False
@@ -105,19 +105,18 @@ class Judgement:
 
     def take(self, looks: Sequence[Look], pictures_s: Sequence[float]) -> None:
         """Judge the looks that are new since the last call."""
-        began_s = min(fault.at_s for fault in self.faults)
         new, self._seen = looks[self._seen :], len(looks)
         for look in new:
-            if look.at_s > began_s:
-                self._judge(look, pictures_s, began_s)
+            if look.at_s > self.fault.at_s:
+                self._judge(look, pictures_s)
 
-    def _judge(self, look: Look, pictures_s: Sequence[float], began_s: float) -> None:
+    def _judge(self, look: Look, pictures_s: Sequence[float]) -> None:
         lacking = self.lacks(look, pictures_s)
         whole = not lacking
-        if self.noticed_s == math.inf and any(f.is_noticed(look, self.expected.before) for f in self.faults):
+        if self.noticed_s == math.inf and self.fault.is_noticed(look, self.expected.before):
             self.noticed_s = look.at_s
         if set(lacking) - {"console as a process"} and look.word == "ok":  # a console is a person's, not the mission's
-            self._unsaid_since_s = min(self._unsaid_since_s, max(began_s, look.began_s))
+            self._unsaid_since_s = min(self._unsaid_since_s, max(self.fault.at_s, look.began_s))
             self.unsaid_s = max(self.unsaid_s, look.at_s - self._unsaid_since_s)
         else:
             self._unsaid_since_s = math.inf
@@ -129,7 +128,8 @@ class Judgement:
     def lacks(self, look: Look, pictures_s: Sequence[float]) -> list[str]:
         """Return what the mission lacks in this look, for people."""
         lacking = self.expected.missing(look)
-        lacking += [f"{fault.victim} as a process" for fault in self.faults if not fault.is_mended(look)]
+        if not self.fault.is_mended(look):
+            lacking.append(f"{self.fault.victim} as a process")
         newest = bisect_right(pictures_s, look.at_s) - 1
         if newest < 0 or look.at_s - pictures_s[newest] > PICTURES_FLOW_S:
             lacking.append("pictures")
@@ -139,11 +139,11 @@ class Judgement:
         """Return the time from the first fault to lasting health; 0.0: health never ended; None: it did not return."""
         if self.good_since_s == math.inf:
             return None
-        return self.good_since_s - min(fault.at_s for fault in self.faults) if self.was_bad else 0.0
+        return self.good_since_s - self.fault.at_s if self.was_bad else 0.0
 
     def noticed_after_s(self) -> float | None:
         """Return the time from the first fault to the first look that showed it; None: no look did."""
-        return None if self.noticed_s == math.inf else self.noticed_s - min(fault.at_s for fault in self.faults)
+        return None if self.noticed_s == math.inf else self.noticed_s - self.fault.at_s
 
 
 def longest_gap_s(pictures_s: Sequence[float], from_s: float, until_s: float) -> float:
