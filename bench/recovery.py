@@ -23,15 +23,7 @@ from itertools import product
 from typing import Any
 
 from measuring import report
-from recovery_breaker import (
-    DOWN_WITHIN_S,
-    FAULTS,
-    MENDED_WITHIN_S,
-    ROWS,
-    Breaker,
-    breaker,
-    rounded,
-)
+from recovery_breaker import DOWN_WITHIN_S, FAULTS, MENDED_WITHIN_S, ROWS, Breaker, breaker, rounded
 from recovery_mission import GONE_WITHIN_S, POLL_S, NotSeen
 from recovery_verdict import Fault
 
@@ -50,9 +42,9 @@ def launcher_ended(breaking: Breaker, fault: Fault) -> dict[str, Any]:
     """Return the time until nothing remains of a mission whose launcher is ended."""
     mission = breaking.mission
     breaking.strike(fault)
-    mission.launcher.wait(DOWN_WITHIN_S)
+    mission.running.launcher.wait(DOWN_WITHIN_S)
     left = mission.left()
-    while mission.directory.exists() and time.monotonic() < fault.at_s + 2 * GONE_WITHIN_S:
+    while mission.running.directory.exists() and time.monotonic() < fault.at_s + 2 * GONE_WITHIN_S:
         time.sleep(POLL_S)
     return {"gone_s": rounded(time.monotonic() - fault.at_s) if not left else None, **breaking.aftermath()}
 
@@ -93,7 +85,7 @@ def main() -> None:
     for victim, fault in product(given.victim or ROWS, given.fault or FAULTS):
         try:
             found = try_fault(victim, fault, given.patience)
-        except NotSeen as error:
+        except (NotSeen, AssertionError) as error:
             found = {"failed": str(error)}
         results.append({"victim": victim, "fault": fault, **found})
         report("recovery", **results[-1])

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import psutil
-from recovery_mission import POLL_S, BenchMission, NotSeen, mission_coming_up
+from recovery_mission import POLL_S, BenchMission, NotSeen, observed_mission
 from recovery_trace import violations
 from recovery_verdict import Expected, Fault, Judgement, longest_gap_s
 
@@ -43,7 +43,6 @@ ROWS: dict[str, tuple[str, ...]] = {
 SIGNALS = {"SIGKILL": signal.SIGKILL, "SIGTERM": signal.SIGTERM}
 STOPS_S = {f"SIGSTOP {stop:g}": stop for stop in (0.3, 1.0, 5.0, 30.0)}
 FAULTS = (*SIGNALS, *STOPS_S)
-UP_WITHIN_S = 90.0
 CALM_S = 6.0  # chosen: longer than a turn, so that the usual gap of pictures at a switch is seen
 STAYS_S = 2.0  # chosen: twice ``GONE_AFTER_S`` of a peer monitor
 MENDED_WITHIN_S = 40.0  # chosen: a fault that lasts longer counts as not mended
@@ -106,7 +105,9 @@ class Breaker:
             fault.lifted_s = now_s
         if fault.victim.endswith("zygote") and fault.replaced_s == math.inf and self.watch.looks:
             look = self.watch.looks[-1]
-            keeper_pid = self.mission.launcher.pid if fault.victim == "core_zygote" else look.pid("creator-base")
+            keeper_pid = (
+                self.mission.running.launcher.pid if fault.victim == "core_zygote" else look.pid("creator-base")
+            )
             if "rows" in look.sight and self.mission.zygote_of(keeper_pid, look) not in (0, fault.pid):
                 fault.replaced_s = now_s
 
@@ -140,9 +141,9 @@ class Breaker:
     def end(self) -> dict[str, Any]:
         """Take the mission down; return the findings of the trace and the remains of the mission."""
         self.mission.detach_console()
-        done = self.mission.down()
+        done = self.mission.running.command("scout-backbone", "down", "--mission", self.mission.running.name)
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self.mission.launcher.wait(DOWN_WITHIN_S)
+            self.mission.running.launcher.wait(DOWN_WITHIN_S)
         return {"down": done.returncode, **self.aftermath()}
 
     def aftermath(self) -> dict[str, Any]:
@@ -150,9 +151,9 @@ class Breaker:
         left = self.mission.left()
         broken, late = violations(self.mission.trace, self._pauses())
         return {
-            "up_exit": self.mission.launcher.poll(),
+            "up_exit": self.mission.running.launcher.poll(),
             "left": len(left),
-            "folder_left": self.mission.directory.exists(),
+            "folder_left": self.mission.running.directory.exists(),
             "violations": len(broken),
             "late_by_pause": len(late),
             **({"violated": [str(each) for each in broken[:SHOWN]]} if broken else {}),
@@ -168,7 +169,7 @@ class Breaker:
 def marked_of(mission: BenchMission) -> list[psutil.Process]:
     """Return the mission's processes, except its console."""
     console = mission.console.pid if mission.console is not None else 0
-    return [process for process in marked(mission.environment[MARK]) if process.pid != console]
+    return [process for process in marked(mission.running.environment[MARK]) if process.pid != console]
 
 
 def rounded(seconds: float | None) -> float | None:
@@ -178,11 +179,6 @@ def rounded(seconds: float | None) -> float | None:
 
 @contextlib.contextmanager
 def breaker(patience_s: float) -> Iterator[Breaker]:
-    """Bring a mission up and yield it when all is ready."""
-    with mission_coming_up() as mission:
-        ends_s = time.monotonic() + UP_WITHIN_S
-        while not any(line.startswith("all ready") for line in list(mission.lines)):
-            if mission.launcher.poll() is not None or time.monotonic() > ends_s:
-                raise NotSeen("\n".join(["the mission did not come up", *mission.lines]))
-            time.sleep(POLL_S)
+    """Bring a mission up, and yield it."""
+    with observed_mission() as mission:
         yield Breaker(mission, patience_s)

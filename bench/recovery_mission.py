@@ -1,4 +1,4 @@
-"""A real mission for faults: started and ended by the real command line, watched from another process.
+"""A real mission for faults, watched from another process.
 
 Rule of this file: it never judges. ``recovery_verdict`` judges the observations.
 """
@@ -7,27 +7,23 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import re
-import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
-import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import psutil
-from measuring import BIN, MISSION_XML
+from measuring import BIN, MISSION_XML, helper
+from missions import RealMission, mission_up
 
-from mission_control.laboratory.module_kit.real_mission import MARK, marked, wait_gone
+from mission_control.laboratory.module_kit.real_mission import MARK, wait_gone
 
 CONSOLE_ROBOT = "scout3"
-COMMAND_WITHIN_S = 60.0
+OBSERVER = Path(__file__).with_name("recovery_observer.py")
 POLL_S = 0.02
 GONE_WITHIN_S = 5.0  # chosen: the aim for a mission whose launcher is gone
 
@@ -81,7 +77,7 @@ class Watch:
         pictures_s: Arrivals of pictures.
     """
 
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[bytes]
     origin_s: float = 0.0
     looks: list[Look] = field(default_factory=list)
     pictures_s: list[float] = field(default_factory=list)
@@ -114,54 +110,29 @@ class Watch:
         raise NotSeen(f"not within {within_s:g} s: {what}; last seen: {self.looks[-1].sight if self.looks else None}")
 
 
-@dataclass
 class BenchMission:
-    """A mission that is coming up or is up.
+    """A mission that is up, and its observations.
 
-    Attributes:
-        name: Its name.
-        environment: Environment for further commands.
-        launcher: The ``up`` process.
+    Args:
+        running: The mission.
         watch: The observations of the mission.
         trace: File of its scheduling decisions.
-        lines: The output of ``up``.
     """
 
-    name: str
-    environment: dict[str, str]
-    launcher: subprocess.Popen[str]
-    watch: Watch
-    trace: Path
-    lines: list[str] = field(default_factory=list)
-    console: subprocess.Popen[str] | None = None
-
-    @property
-    def directory(self) -> Path:
-        """Its run folder."""
-        return Path(self.environment["XDG_RUNTIME_DIR"]) / "scout-backbone" / self.name
-
-    def command(self, *words: str) -> subprocess.CompletedProcess[str]:
-        """Run one of the command lines beside it."""
-        return subprocess.run(
-            [str(BIN / words[0]), *words[1:], "--mission", self.name],
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=COMMAND_WITHIN_S,
-            check=False,
-        )
+    def __init__(self, running: RealMission, watch: Watch, trace: Path) -> None:
+        self.running, self.watch, self.trace = running, watch, trace
+        self.console: subprocess.Popen[bytes] | None = None
 
     def attach_console(self) -> int:
         """Let a person of priority 100 take a robot and hold it; return the console's process."""
         self.detach_console()
-        words = ["attach", CONSOLE_ROBOT, "--priority", "100", "--script", "-", "--mission", self.name]
+        words = ["attach", CONSOLE_ROBOT, "--priority", "100", "--script", "-", "--mission", self.running.name]
         self.console = subprocess.Popen(
             [str(BIN / "scout-console"), *words],
-            env=self.environment,
+            env=self.running.environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            text=True,
         )
         self.watch.wait("the console holds its robot", lambda look: bool(console_arcs(look)), 20.0)
         return self.console.pid
@@ -180,20 +151,16 @@ class BenchMission:
             self.console.wait()
         self.console = None
 
-    def down(self) -> subprocess.CompletedProcess[str]:
-        """Take the mission down by command."""
-        return self.command("scout-backbone", "down")
-
     def left(self) -> list[psutil.Process]:
         """Return its remaining processes after at most ``GONE_WITHIN_S``."""
-        return wait_gone(self.environment[MARK], GONE_WITHIN_S)
+        return wait_gone(self.running.environment[MARK], GONE_WITHIN_S)
 
     def processes(self, look: Look) -> dict[str, int]:
         """Return victim, zygotes included → process; empty if the look has no rows."""
         if not look.rows:
             return {}
         found = {name: look.pid(name) for name in look.rows if look.pid(name)}
-        found["core_zygote"] = self.zygote_of(self.launcher.pid, look)
+        found["core_zygote"] = self.zygote_of(self.running.launcher.pid, look)
         found["zygote"] = self.zygote_of(found.get("creator-base", 0), look)
         return {name: pid for name, pid in found.items() if pid}
 
@@ -213,61 +180,22 @@ def console_arcs(look: Look) -> list[str]:
 
 
 @contextlib.contextmanager
-def mission_coming_up() -> Iterator[BenchMission]:
-    """Start a mission and an observer; at the end of the block kill the remaining processes."""
+def observed_mission() -> Iterator[BenchMission]:
+    """Bring a mission up and observe it until the block ends."""
     with tempfile.TemporaryDirectory(prefix="scout-bench-") as folder:
-        mark = uuid.uuid4().hex
-        name = f"bench-{mark[:8]}"
-        text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{name}", MISSION_XML.read_text(), count=1)
-        file, trace = Path(folder) / "mission.xml", Path(folder) / "trace.jsonl"
-        file.write_text(text)
-        plain = {**os.environ, "XDG_RUNTIME_DIR": folder}
-        environment = {**plain, MARK: mark}
-        observer = subprocess.Popen(
-            [sys.executable, str(Path(__file__).parent / "recovery_observer.py"), name],
-            env=plain,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        launcher = subprocess.Popen(
-            [str(BIN / "scout-backbone"), "up", str(file), "--headless", "--trace", str(trace)],
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        mission = BenchMission(name, environment, launcher, Watch(observer), trace)
-        readers = [threading.Thread(target=mission.watch.read), threading.Thread(target=_read, args=(mission,))]
-        for reader in readers:
+        trace = Path(folder) / "trace.jsonl"
+        with (
+            mission_up(MISSION_XML, "--trace", str(trace)) as running,
+            helper(str(OBSERVER), running.name, answers=True) as observer,
+        ):
+            watch = Watch(observer)
+            reader = threading.Thread(target=watch.read)
             reader.start()
-        try:
-            yield mission
-        finally:
-            _clean_up(mission, readers)
-
-
-def _clean_up(mission: BenchMission, readers: list[threading.Thread]) -> None:
-    for process in marked(mission.environment[MARK]):
-        with contextlib.suppress(psutil.Error):
-            process.send_signal(signal.SIGKILL)
-    mission.launcher.wait()
-    if mission.console is not None:
-        mission.console.wait()
-    assert mission.watch.process.stdin is not None
-    mission.watch.process.stdin.close()
-    try:
-        mission.watch.process.wait(GONE_WITHIN_S)
-    except subprocess.TimeoutExpired:
-        mission.watch.process.kill()
-        mission.watch.process.wait()
-    for reader in readers:
-        reader.join()
-    for stream in (mission.watch.process.stdout, mission.launcher.stderr):
-        assert stream is not None
-        stream.close()
-
-
-def _read(mission: BenchMission) -> None:
-    assert mission.launcher.stderr is not None
-    mission.lines.extend(line.rstrip() for line in mission.launcher.stderr)
+            mission = BenchMission(running, watch, trace)
+            try:
+                yield mission
+            finally:
+                mission.detach_console()
+                assert observer.stdin is not None
+                observer.stdin.close()
+                reader.join()

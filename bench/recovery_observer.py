@@ -10,25 +10,22 @@ Lines: ``{"began", "t", "sight"}`` for a look (``sight`` is omitted if it equals
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
 import sys
 import time
 from typing import Any
 
-from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
-from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.errors import HubUnreachable, LinkError, Refusal
+from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
+from backbone.launcher.mission_connection import connected
 from backbone.naming import component_of
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
 from resource_pool.messages import Frame
 
 LOOK_EVERY_S = 0.05
-FOUND_EVERY_S = 0.02  # interval of the search for a mission that is coming up
 UNREACHABLE = "unreachable"  # stands for the end of ``status`` with exit code 4
 
 
@@ -53,24 +50,6 @@ def say(**said: Any) -> None:
     sys.stdout.flush()
 
 
-async def found(mission: str) -> run_files.RunFile:
-    """Return the mission's run file, as soon as its launcher has written it."""
-    while True:
-        with contextlib.suppress(run_files.MissionNotUp):
-            return run_files.find(mission)
-        await asyncio.sleep(FOUND_EVERY_S)
-
-
-async def open_bus(run_file: run_files.RunFile, clock: MissionClock) -> ZenohBus:
-    """Return a bus as soon as the hub listens."""
-    while True:
-        with contextlib.suppress(HubUnreachable):
-            return await ZenohBus.open_when_up(
-                run_file.mission, "ui_console/recovery", clock, client_config(run_file.endpoint)
-            )
-        await asyncio.sleep(FOUND_EVERY_S)
-
-
 async def watch(bus: Bus, clock: MissionClock) -> None:
     """Observe repeatedly."""
     last: dict[str, Any] = {}
@@ -86,16 +65,11 @@ async def watch(bus: Bus, clock: MissionClock) -> None:
 
 
 async def attend(mission: str) -> None:
-    """Find the mission and observe it."""
-    run_file = await found(mission)
-    say(origin=run_file.clock_origin_monotonic_s)
-    clock = MissionClock(run_file.clock_origin_monotonic_s, run_file.clock_rate)
-    bus = await open_bus(run_file, clock)
-    try:
+    """Observe the mission."""
+    async with connected(mission, None, "ui_console/recovery") as (bus, clock):
+        say(origin=clock.origin_monotonic_s)
         bus.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda _envelope: say(frame=time.monotonic()))
         await watch(bus, clock)
-    finally:
-        await bus.close()
 
 
 async def observe(mission: str) -> None:
