@@ -70,10 +70,11 @@ def _own_threads_of_zenoh() -> Iterator[None]:
     """Keep zenoh's own threads in this process, in which many tests have their hub.
 
     A command that a test calls here would leave a client's two threads for all tests after it: then a question of the
-    hub's process waits for itself.
+    hub's process waits for itself. A nameserver here would leave a hub's threads for all processes that tests start.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(zenoh_threads, "few_threads", lambda: None)
+        patch.setattr("backbone.nameserver.service.threads_of_a_hub", lambda: None)
         yield
 
 
