@@ -31,10 +31,9 @@ from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.debug_views import SeenViews
 from ui_console.model.key_shown import KeyList, MessageShown
 from ui_console.model.map import BodyView, FloorView
-from ui_console.model.playback import PlaybackView
 from ui_console.model.timeline import TimelineView
 from ui_console.web.login import BeatRequest, Hello
-from ui_console.web.playing import Playing
+from ui_console.web.playing import PlaybackView, Playing
 from ui_console.web.protocol import Intent
 
 _PLAIN: dict[type[inspect.Type], str] = {

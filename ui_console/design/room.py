@@ -87,7 +87,7 @@ class DesignRoom:
 
     Args:
         kept: The draft file, until the draft is saved.
-        look_up: Asks classes for their documentation and parameters, see ``look_up.look_up``.
+        look_up: Asks classes for their documentation and parameters, see ``serving.look_up``.
     """
 
     def __init__(self, draft: Draft, kept: DraftFile, look_up: LookUpClasses) -> None:

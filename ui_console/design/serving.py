@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from backbone.launcher.endings import ExitCode, say
+from backbone.mission.class_asking import ask_classes
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.reader import MissionInvalid
-from ui_console.design.look_up import look_up
 from ui_console.design.room import DesignRoom
 from ui_console.design.server import DesignServer, begin
 from ui_console.session.joining import end_server_on_signals
@@ -42,3 +43,12 @@ async def serve_designer(file: str, rights: Mapping[str, TokenRights], options: 
     server = DesignServer(DesignRoom(draft, kept, look_up), Authenticator(rights))
     await server.run(options.host, options.port, lambda port: options.opened(port, tokens, rights), end, encryption)
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
+
+
+async def look_up(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
+    """Return the facts of each class, read in another process; if a class has no facts, ``failure`` has the reason.
+
+    Args:
+        class_paths: Class paths ``package.module:Class``. Their modules are executed.
+    """
+    return await asyncio.to_thread(ask_classes, class_paths)

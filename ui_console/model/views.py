@@ -16,7 +16,7 @@ from backbone.scheduling.views import RequestView
 from backbone.wire import plain
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.gauges import GaugeView
-from ui_console.model.order_view import OrderView
+from ui_console.model.order_board import OrderView
 from ui_console.model.timeline import TimelineView
 
 NONE_S = -1.0

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ui_console.model.order_places import inside
-from ui_console.model.orders import Order, OrderKind, group
+from ui_console.model.orders import Order, OrderKind, group, inside
 from ui_console.model.team import TeamModel
 from ui_console.web.protocol import OrderRequest, PictureOrder
 

@@ -1,4 +1,4 @@
-"""Messages of a page that shows a recording: for viewing and for playback."""
+"""Messages of a page that shows a recording: for viewing and for playback, and the state of the playback."""
 
 from __future__ import annotations
 
@@ -38,6 +38,24 @@ Looking = (
     | WhyRequest
 )
 """Intents that command nothing."""
+
+
+class PlaybackView(msgspec.Struct, frozen=True):
+    """Position and state of the playback.
+
+    Attributes:
+        begin_s: Mission time of its first message.
+        end_s: Mission time of its last message.
+        at_s: Shown mission time.
+        is_playing: False: paused.
+        speed: Mission seconds per second of the machine while it plays.
+    """
+
+    begin_s: float
+    end_s: float
+    at_s: float
+    is_playing: bool
+    speed: float
 
 
 class PlayOn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="play_on"):

@@ -19,7 +19,6 @@ from backbone.keys import COPIED
 from backbone.recording.playback import Playback
 from backbone.recording.reader import Recording
 from backbone.waiting import first_to_end
-from ui_console.model.playback import PlaybackView
 from ui_console.session.recorded_play import NOT_NOW, RecordedPlay
 from ui_console.web.hub import WebHub
 from ui_console.web.key_ears import RecordingEar
@@ -27,7 +26,7 @@ from ui_console.web.key_watch import KeyWatch
 from ui_console.web.login import ProtocolViolation, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.page_client import PageClient
-from ui_console.web.playing import Looking, Playing, PlayOn, ShowTime, StandStill, StepOn
+from ui_console.web.playing import Looking, PlaybackView, Playing, PlayOn, ShowTime, StandStill, StepOn
 from ui_console.web.protocol import Intent, ParametersRequest, SearchLog, WhyRequest
 
 TOLD_EVERY_S = 0.1  # chosen: the slider moves smoothly; machine seconds

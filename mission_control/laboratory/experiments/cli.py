@@ -137,7 +137,7 @@ def load(
     traces: TracesTo = None,
 ) -> None:
     """Put 2 to 10 robots on one channel, two of which watch; count how often a passing target is detected."""
-    from mission_control.laboratory.experiments.load import load_conditions
+    from mission_control.laboratory.experiments.conditions import load_conditions
 
     conditions = list(load_conditions(policy.value, channels, driven))
     _run(conditions, "Load: 2 to 10 robots", trials, seed, jobs, as_json=as_json, plot=plot, traces=traces)

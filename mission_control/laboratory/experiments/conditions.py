@@ -16,6 +16,7 @@ Order = Literal["active-first", "extra-first", "interleaved"]
 CONSOLE_SLICE_S = 2.0  # chosen: half the time for which a Pioneer is in view, so that no slice hides it
 MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
 SHORTEST_SLICE_S = 0.1  # chosen: one or two pictures; in less a watcher sees nothing
+FEWEST, MOST = 2, 10  # robots of the load experiment
 SLOWEST_M_S = 0.01  # chosen: a quarter of an hour through the room; a trial lasts as long
 
 
@@ -177,3 +178,14 @@ BESIDE: Sequence[Condition] = tuple(
 )
 EVERYTHING: Sequence[Condition] = (*PAPERS, *QUARTER, *ALWAYS, *BESIDE)
 """The conditions without further options."""
+
+
+def load_conditions(policy: Policy = "paper", channels: int = 1, driven: float = 1.0) -> Sequence[Condition]:
+    """Return a condition for each number of robots: two watch, the others are held by consoles.
+
+    Source: IROS 2001, "Conclusions": one channel is of no use beyond about 8 or 9 robots.
+    """
+    return tuple(
+        Condition(extra=robots - FEWEST, policy=policy, channels=channels, driven=driven)
+        for robots in range(FEWEST, MOST + 1)
+    )

@@ -11,7 +11,7 @@ from tutorial_commands import run_all
 
 from backbone.mission.reader import read_mission
 from ui_console.design.file import save
-from ui_console.design.look_up import look_up
+from ui_console.design.serving import look_up
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 

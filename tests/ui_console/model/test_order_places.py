@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resource_pool.arc_client import FloorPlan
-from ui_console.model.order_places import EDGE_M, inside
-from ui_console.model.orders import Order, OrderKind, group
+from ui_console.model.orders import EDGE_M, Order, OrderKind, group, inside
 
 GO = Order(OrderKind.GO_TO, "scout1", 2.0, 1.0)
 

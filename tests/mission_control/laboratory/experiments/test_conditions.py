@@ -7,9 +7,14 @@ from examples import share
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mission_control.laboratory.experiments.conditions import EVERYTHING, Condition, ImpossibleCondition, checked
+from mission_control.laboratory.experiments.conditions import (
+    EVERYTHING,
+    Condition,
+    ImpossibleCondition,
+    checked,
+    load_conditions,
+)
 from mission_control.laboratory.experiments.geometry import EXTRAS, WATCHERS
-from mission_control.laboratory.experiments.load import load_conditions
 from mission_control.laboratory.experiments.mission_file import mission_of, mission_of_trial, mission_text
 from mission_control.laboratory.experiments.trial import draw
 
