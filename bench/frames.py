@@ -69,7 +69,7 @@ def joined(folder: str, source: str) -> tuple[ZenohBus, zenoh.Session]:
 
 def be_hub(folder: str) -> None:
     """Run as the hub process."""
-    with zenoh.open(with_shared_memory(hub_settings([socket_endpoint(Path(folder))], [], ""))):
+    with zenoh.open(with_shared_memory(hub_settings([socket_endpoint(Path(folder))], ""))):
         print("ready", flush=True)
         wait_for_end_of_input()
 

@@ -39,11 +39,6 @@ class Doubt:
         half, apart = (self.xx + self.yy) / 2, math.hypot((self.xx - self.yy) / 2, self.xy)
         return math.sqrt(max(0.0, half + apart))
 
-    @property
-    def spread_rad(self) -> float:
-        """Standard deviation of the heading."""
-        return math.sqrt(self.hh)
-
     def moved(self, x_m: float, y_m: float, way_m: float, turned_rad: float) -> Doubt:
         """Return the doubt after a motion.
 

@@ -235,11 +235,6 @@ class HostLines:
         self._number = 0
         self._loop.add_reader(self._listening, self._accept)
 
-    @property
-    def askers(self) -> int:
-        """Number of processes that ask this one."""
-        return len(self._answering)
-
     def serve(self, inbox: str, asked: Callable[[HostQuestion], None]) -> Withdrawal:
         """Call a function with each question to this inbox until withdrawn."""
         self._inboxes[inbox] = asked

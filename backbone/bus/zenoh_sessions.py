@@ -17,9 +17,9 @@ def client_config(endpoint: str, secret: str = "") -> zenoh.Config:
     return _config(client_settings(endpoint, secret))
 
 
-def hub_config(listen: list[str], connect: list[str] | None = None, *, dictionary_file: str = "") -> zenoh.Config:
+def hub_config(listen: list[str], *, dictionary_file: str = "") -> zenoh.Config:
     """Return the configuration of a hub; see ``hub_settings``."""
-    return _config(hub_settings(listen, connect or [], dictionary_file))
+    return _config(hub_settings(listen, dictionary_file))
 
 
 def _config(settings: dict[str, object]) -> zenoh.Config:

@@ -40,25 +40,19 @@ def client_settings(endpoint: str, secret: str = "") -> dict[str, object]:
     }
 
 
-def hub_settings(listen: list[str], connect: list[str], dictionary_file: str) -> dict[str, object]:
-    """Return the settings of a hub that listens at some endpoints and joins the hubs at others.
+def hub_settings(listen: list[str], dictionary_file: str) -> dict[str, object]:
+    """Return the settings of a hub that listens at these endpoints.
 
     Args:
         listen: Its endpoints.
-        connect: Endpoints of other hubs.
         dictionary_file: Users and secrets of its clients; empty: it authenticates no client.
     """
-    settings: dict[str, object] = {
+    return {
         "scouting": {**_QUIET, "delay": 0},
-        "transport": _transport(
-            [*listen, *connect], {"usrpwd": {"dictionary_file": dictionary_file}} if dictionary_file else {}
-        ),
+        "transport": _transport(listen, {"usrpwd": {"dictionary_file": dictionary_file}} if dictionary_file else {}),
         "mode": "router",
         "listen": {"endpoints": listen, "exit_on_failure": True},
     }
-    if connect:
-        settings["connect"] = {"endpoints": connect, "timeout_ms": -1, "exit_on_failure": False, "retry": _RETRY}
-    return settings
 
 
 def _transport(endpoints: Iterable[str], auth: Mapping[str, object]) -> dict[str, object]:

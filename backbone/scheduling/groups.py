@@ -4,57 +4,18 @@ A group is a connected component of active ARCs that share any RC. Sharable RCs 
 their users, even if not in pairs: of three ARCs of 0.4 any two fit, but not all three. Groups run in parallel and never
 change each other's times.
 
-``groups`` computes them; ``Groups`` updates them while ARCs come and go.
-
 Source: RAM 2002, "ARCs that ask for independent sets of RCs are put into different groups".
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Collection, Hashable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 A = TypeVar("A", bound=Hashable)
 
 SPLIT_SHARE = 8  # chosen: a search through a big group costs each ARC that leaves it a few steps
-
-
-def groups(uses: Mapping[str, Collection[str]]) -> list[list[str]]:
-    """Return the groups of these ARCs.
-
-    Args:
-        uses: ARC → RCs that it needs.
-
-    Returns:
-        Every ARC once; groups and their members in the order of ``uses``.
-
-    Example:
-        >>> groups({"left": {"v1", "s1"}, "arm": {"a"}, "right": {"v1", "s2"}})
-        [['left', 'right'], ['arm']]
-    """
-    users: dict[str, list[str]] = {}
-    for arc, rcs in uses.items():
-        for rc in rcs:
-            users.setdefault(rc, []).append(arc)
-    group_of: dict[str, int] = {}
-    number = 0
-    for arc in uses:
-        if arc in group_of:
-            continue
-        reached = [arc]
-        group_of[arc] = number
-        while reached:
-            for rc in uses[reached.pop()]:
-                for neighbor in users.pop(rc, ()):
-                    if neighbor not in group_of:
-                        group_of[neighbor] = number
-                        reached.append(neighbor)
-        number += 1
-    found: list[list[str]] = [[] for _ in range(number)]
-    for arc in uses:
-        found[group_of[arc]].append(arc)
-    return found
 
 
 @dataclass(slots=True, eq=False)
@@ -89,10 +50,6 @@ class Groups(Generic[A]):
 
     def __contains__(self, arc: A) -> bool:
         return arc in self.of
-
-    def all(self) -> list[Group[A]]:
-        """Return all groups, in the order of their first ARCs' arrivals."""
-        return list(dict.fromkeys(self.of.values()))
 
     def add(self, arc: A, rcs: Collection[str]) -> None:
         """Add the ARC; it joins the groups of all ARCs that use its RCs."""

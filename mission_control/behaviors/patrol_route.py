@@ -59,11 +59,6 @@ class PatrolRoute:
         self._decided_s: float | None = None
         self._pursuit = Pursuit(speed_m_s)
 
-    @property
-    def visits(self) -> Sequence[Visit]:
-        """The last ``REMEMBERED`` arrivals, oldest first."""
-        return tuple(self._visits)
-
     def visits_since(self, number: int) -> Sequence[Visit]:
         """Return the kept arrivals after this number."""
         return tuple(visit for visit in self._visits if visit.number > number)

@@ -278,7 +278,7 @@ def test_a_doubt_stays_one_of_places_and_directions(
     doubt = Doubt.of(spread_m, spread_rad)
     for x_m, y_m, turned_rad in ways:
         before, doubt = doubt, doubt.moved(x_m, y_m, math.hypot(x_m, y_m), turned_rad)
-        assert doubt.spread_rad >= before.spread_rad
+        assert doubt.hh >= before.hh
         assert doubt.xx >= -1e-9
         assert doubt.yy >= -1e-9
         assert doubt.xy**2 <= doubt.xx * doubt.yy + 1e-6

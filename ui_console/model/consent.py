@@ -170,10 +170,6 @@ class ConsentDesk:
         """The open questions, the next one first."""
         return tuple(self._open)
 
-    def seek(self, asker: str, asked: AskConsent, now_s: float, within_s: float = CONSENT_WITHIN_S) -> Sought:
-        """Open a question for the robot that this console holds; see ``open_question``."""
-        return self.open_question(Sought(asker, asked.user, asked.robot, asked.why, now_s + within_s))
-
     def open_question(self, sought: Sought) -> Sought:
         """Open a question, and return it with its number.
 

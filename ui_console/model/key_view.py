@@ -69,10 +69,6 @@ class KeyView:
         """Return the numbers of a row over time; None: the row has no numbers."""
         return self._series.get(name)
 
-    def names(self) -> list[str]:
-        """Return the rows with numbers, in the order of the newest message."""
-        return [row.name for row in self.rows if row.name in self._series and row.number is not None]
-
     def _shown(self, body: object) -> tuple[Sequence[FieldRow], PixelPicture | None]:
         if isinstance(body, Mapping):
             try:

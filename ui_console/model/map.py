@@ -149,11 +149,6 @@ class MapBoard:
         """
         return self._floor
 
-    @property
-    def names(self) -> list[str]:
-        """All bodies with a place, sorted."""
-        return sorted(self._tracks)
-
     def views(self, now_s: float) -> list[BodyView]:
         """Return the bodies, sorted by name."""
         schedule = self._picture.schedule

@@ -245,23 +245,6 @@ async def until_gone(hub: ZenohBus) -> None:
     watching.close()
 
 
-async def test_two_hubs_joined_carry_questions_between_their_clients() -> None:
-    async def answer(asked: Envelope[Any]) -> Message:
-        return Stopping()
-
-    first, second = free_endpoint(), free_endpoint()
-    async with hub_at(first):
-        far = ZenohBus.open("hostile", "backbone/far_hub", CLOCK, hub_config([second], [first]))
-        try:
-            async with joined(first, ASKER) as (asker,), joined(second, SERVER) as (server,):
-                server.serve(SERVER, AskState, answer)
-                server.declare_alive(SERVER)
-                await until_alive(asker, SERVER)
-                assert await asker.ask(SERVER, AskState(), Stopping, within_s=DEADLINE_S) == Stopping()
-        finally:
-            await far.close()
-
-
 async def test_a_hub_on_a_taken_port_is_unreachable() -> None:
     endpoint = free_endpoint()
     async with hub_at(endpoint):

@@ -49,7 +49,7 @@ def route(waypoints: list[FloorPoint], *, rounds: int = 1, rest_s: float = 0.0) 
 
 
 def record(patrol: PatrolRoute) -> list[tuple[int, int]]:
-    return [(visit.number, visit.waypoint) for visit in patrol.visits]
+    return [(visit.number, visit.waypoint) for visit in patrol.visits_since(0)]
 
 
 def undisturbed(waypoints: list[FloorPoint], rounds: int) -> list[tuple[int, int]]:
