@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import psutil
-from measuring import BIN, MISSION_XML, report
+from measuring import BIN, MISSION_XML, busy_s, report
 from missions import RealMission, mission_up, own_processes
 
 COLUMNS, LINES = 120, 40
@@ -63,18 +63,6 @@ def in_a_terminal(command: list[str]) -> Iterator[tuple[psutil.Process, list[int
         process.terminate()
         process.wait(10)
         os.close(ours)
-
-
-def busy_s(processes: list[psutil.Process]) -> float:
-    """Return the processor time of these processes so far; one that has ended counts 0."""
-    total = 0.0
-    for process in processes:
-        try:
-            times = process.cpu_times()
-        except psutil.NoSuchProcess:
-            continue
-        total += times.user + times.system
-    return total
 
 
 def turns_of_consoles() -> int:

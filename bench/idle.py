@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import psutil
-from measuring import MISSION_XML, report
+from measuring import MISSION_XML, busy_s, report
 from missions import mission_up, own_processes
 
 SETTLE_S = 5.0  # chosen: the behaviors have their ARCs, and the first slices have begun
@@ -26,26 +26,20 @@ def wake_ups(pid: int) -> int:
     return found
 
 
-def processor_s(pid: int) -> float:
-    """Return the processor time of a process, in seconds."""
-    times = psutil.Process(pid).cpu_times()
-    return times.user + times.system
-
-
 def name_of(process: psutil.Process) -> str:
     """Return the name of a process; the zygote names each process for its component."""
     return Path(f"/proc/{process.pid}/comm").read_text().strip()
 
 
-def measured(pids: Sequence[int], seconds: float) -> dict[int, tuple[float, float]]:
+def measured(processes: Sequence[psutil.Process], seconds: float) -> dict[int, tuple[float, float]]:
     """Return wake-ups a second and share of a core of each process over so many seconds."""
-    before = {pid: (wake_ups(pid), processor_s(pid)) for pid in pids}
+    before = {one: (wake_ups(one.pid), busy_s([one])) for one in processes}
     began_s = time.monotonic()
     time.sleep(seconds)
     span_s = time.monotonic() - began_s
     return {
-        pid: ((wake_ups(pid) - waited) / span_s, (processor_s(pid) - busy_s) / span_s)
-        for pid, (waited, busy_s) in before.items()
+        one.pid: ((wake_ups(one.pid) - waited) / span_s, (busy_s([one]) - then_s) / span_s)
+        for one, (waited, then_s) in before.items()
     }
 
 
@@ -58,7 +52,7 @@ def main() -> None:
     with mission_up(given.mission) as running:
         time.sleep(SETTLE_S)
         names = {one.pid: name_of(one) for one in own_processes(running)}
-        found = measured(list(names), given.seconds)
+        found = measured([*map(psutil.Process, names)], given.seconds)
     rows = sorted(((names[pid], *figures) for pid, figures in found.items()), key=lambda row: -row[1])
     report(
         "idle",

@@ -8,9 +8,9 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,16 @@ def report(claim: str, **measured: Any) -> None:
     stolen_s = psutil.cpu_times().steal - _STOLEN_BEFORE_S if psutil.LINUX else 0.0
     machine = {"cpus": os.cpu_count(), "load": round(os.getloadavg()[0], 2), "stolen_s": round(stolen_s, 2)}
     print(json.dumps({"bench": claim, **measured, **machine}))
+
+
+def busy_s(processes: Iterable[psutil.Process]) -> float:
+    """Return the processor time of these processes so far; one that has ended counts 0."""
+    total_s = 0.0
+    for process in processes:
+        with suppress(psutil.NoSuchProcess):
+            times = process.cpu_times()
+            total_s += times.user + times.system
+    return total_s
 
 
 def free_endpoint() -> str:

@@ -24,7 +24,7 @@ from pathlib import Path
 from statistics import median, quantiles
 
 import psutil
-from measuring import BIN, report
+from measuring import BIN, busy_s, report
 from missions import mission_up
 from switch_time import NAME, Measured, fast_mission, measure, switches_s
 
@@ -65,25 +65,17 @@ def run(mission: str, trace: Path, seconds: float, listener: list[str], runs: Ru
 
 
 @contextmanager
-def recorder_of(listener: list[str]) -> Iterator[subprocess.Popen[bytes] | None]:
+def recorder_of(listener: list[str]) -> Iterator[list[psutil.Process]]:
     """Keep a process up that overhears the mission until the block ends; an empty command starts none."""
     if not listener:
-        yield None
+        yield []
         return
     recorder = subprocess.Popen(listener)
     try:
-        yield recorder
+        yield [psutil.Process(recorder.pid)]
     finally:
         recorder.send_signal(signal.SIGINT)
         recorder.wait(20)
-
-
-def busy_s(recorder: subprocess.Popen[bytes] | None) -> float:
-    """Return the recorder's processor time so far."""
-    if recorder is None:
-        return 0.0
-    times = psutil.Process(recorder.pid).cpu_times()
-    return times.user + times.system
 
 
 async def overhear() -> None:

@@ -31,8 +31,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import psutil
-from idle import name_of, processor_s
-from measuring import BIN, percentile, report
+from idle import name_of
+from measuring import BIN, busy_s, percentile, report
 from missions import RealMission, mission_up, own_processes
 from scale_mission import NAME, SETTLE_S, SHARING, components, mission_file
 from switch_time import switches_s
@@ -90,7 +90,7 @@ def busy(processes: Sequence[psutil.Process]) -> dict[int, tuple[str, float]]:
     found = {}
     for process in processes:
         try:
-            found[process.pid] = kind_of(process), processor_s(process.pid)
+            found[process.pid] = kind_of(process), busy_s([process])
         except (psutil.NoSuchProcess, FileNotFoundError):
             continue
     return found

@@ -6,7 +6,6 @@ import asyncio
 import os
 import re
 import shutil
-import signal
 import time
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
@@ -52,7 +51,6 @@ class Page(TriedConsole):
         super().__init__(name, relay)
         self._page = page
         self._aimed: dict[Gesture, dict[str, float] | None] = {}
-        self._asleep: list[int] = []
         self._has_gamepad = Gesture.PAD_ONE in self.kind.gestures
 
     async def take(self) -> None:
@@ -110,17 +108,6 @@ class Page(TriedConsole):
         )
         return " / ".join(shown)
 
-    async def freeze(self) -> None:
-        """See ``TriedConsole``."""
-        self._asleep = await self._renderers()
-        for pid in self._asleep:
-            os.kill(pid, signal.SIGSTOP)
-
-    async def thaw(self) -> None:
-        """See ``TriedConsole``."""
-        for pid in self._asleep:
-            os.kill(pid, signal.SIGCONT)
-
     async def _hold(self) -> None:
         await self._page.keyboard.down("d")
         await asyncio.Event().wait()
@@ -134,7 +121,7 @@ class Page(TriedConsole):
             press = self._page.mouse.click if self.name == "page desktop" else self._page.touchscreen.tap
             await press(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
 
-    async def _renderers(self) -> list[int]:
+    async def _pids(self) -> list[int]:
         browser = await self._page.context.browser.new_browser_cdp_session()
         found = await browser.send("SystemInfo.getProcessInfo")
         await browser.detach()

@@ -40,6 +40,7 @@ class TriedConsole(ABC):
         self.name, self.kind, self.relay = name, KINDS[name], relay
         self._holding: asyncio.Task[None] | None = None
         self._let_go_s = 0.0
+        self._frozen: list[int] = []
 
     async def drive(self) -> None:
         """Hold the driving keys down until ``let_go``; begin only after earlier keys count as released."""
@@ -82,13 +83,20 @@ class TriedConsole(ABC):
     async def says(self) -> str:
         """Return the console's text about its own state."""
 
-    @abstractmethod
     async def freeze(self) -> None:
-        """Stop its process."""
+        """Stop its processes."""
+        self._frozen = await self._pids()
+        for pid in self._frozen:
+            os.kill(pid, signal.SIGSTOP)
+
+    async def thaw(self) -> None:
+        """Continue its processes."""
+        for pid in self._frozen:
+            os.kill(pid, signal.SIGCONT)
 
     @abstractmethod
-    async def thaw(self) -> None:
-        """Continue its process."""
+    async def _pids(self) -> list[int]:
+        """Return the processes whose stop freezes the console."""
 
     @abstractmethod
     async def _hold(self) -> None:
@@ -183,13 +191,8 @@ class Terminal(TriedConsole):
         lines = (await self._screen()).splitlines()
         return " / ".join(FRAMES.sub("", line).strip() for line in lines[:2])
 
-    async def freeze(self) -> None:
-        """See ``TriedConsole``."""
-        os.kill(self._pid, signal.SIGSTOP)
-
-    async def thaw(self) -> None:
-        """See ``TriedConsole``."""
-        os.kill(self._pid, signal.SIGCONT)
+    async def _pids(self) -> list[int]:
+        return [self._pid]
 
     async def _hold_no_key(self) -> None:
         if not self._has_gamepad:
@@ -240,21 +243,53 @@ class Terminal(TriedConsole):
         return (await done.communicate())[0].decode()
 
 
-class Script(TriedConsole):
-    """A console that reads lines from a pipe."""
+class OfLines(TriedConsole):
+    """A console whose output is lines of text."""
 
     def __init__(self, name: str, relay: Relay) -> None:
         super().__init__(name, relay)
         self._heard: list[str] = []
         self._process: asyncio.subprocess.Process | None = None
-        self._command: tuple[list[str], dict[str, str]] = ([], {})
         self._reading: asyncio.Task[None] | None = None
+
+    async def _begin(self, words: list[str], environment: dict[str, str]) -> None:
+        """Run its program, with this environment besides our own."""
+        pipe = asyncio.subprocess.PIPE
+        self._process = await asyncio.create_subprocess_exec(
+            *words, env={**os.environ, **environment}, stdin=pipe, stdout=pipe
+        )
+        self._reading = asyncio.create_task(self._read(self._process), name="the console's lines")
+
+    async def _end(self) -> None:
+        """Kill its program, if it runs."""
+        process, self._process = self._process, None
+        if process is None or self._reading is None:
+            return
+        if process.returncode is None:
+            process.kill()
+        await process.wait()
+        await self._reading
+
+    async def _pids(self) -> list[int]:
+        assert self._process is not None
+        return [self._process.pid]
+
+    async def _read(self, process: asyncio.subprocess.Process) -> None:
+        assert process.stdout is not None
+        async for line in process.stdout:
+            self._heard.append(line.decode().rstrip())
+
+
+class Script(OfLines):
+    """A console that reads lines from a pipe."""
+
+    _command: tuple[list[str], dict[str, str]] = ([], {})
 
     @asynccontextmanager
     async def present(self, environment: dict[str, str], mission: str) -> AsyncIterator[Script]:
         """Run the console until the block ends."""
         words = [str(BIN / "scout-console"), *self.kind.words, "--user", "sam", "--mission", mission]
-        self._command = words, {**os.environ, **environment}
+        self._command = words, environment
         try:
             yield self
         finally:
@@ -265,10 +300,7 @@ class Script(TriedConsole):
         """See ``TriedConsole``."""
         if self._process is None or self._process.returncode is not None:
             await self._end()
-            words, environment = self._command
-            pipe = asyncio.subprocess.PIPE
-            self._process = await asyncio.create_subprocess_exec(*words, env=environment, stdin=pipe, stdout=pipe)
-            self._reading = asyncio.create_task(self._read(), name="script's lines")
+            await self._begin(*self._command)
 
     async def go(self, place: Place) -> None:
         """See ``TriedConsole``."""
@@ -293,16 +325,6 @@ class Script(TriedConsole):
             " ".join(str(one[key]) for key in ("event", "code", "detail") if key in one) for one in told[-3:]
         )
 
-    async def freeze(self) -> None:
-        """See ``TriedConsole``."""
-        assert self._process is not None
-        self._process.send_signal(signal.SIGSTOP)
-
-    async def thaw(self) -> None:
-        """See ``TriedConsole``."""
-        assert self._process is not None
-        self._process.send_signal(signal.SIGCONT)
-
     async def _hold(self) -> None:
         await self._write({"at_s": 0, "halt": True})
         await self._write({"at_s": 0, "left_rad_s": TURN.left_rad_s, "right_rad_s": TURN.right_rad_s})
@@ -316,18 +338,3 @@ class Script(TriedConsole):
         if process is not None and process.returncode is None and process.stdin is not None:
             process.stdin.write(json.dumps(line).encode() + b"\n")
             await process.stdin.drain()
-
-    async def _read(self) -> None:
-        assert self._process is not None
-        assert self._process.stdout is not None
-        async for line in self._process.stdout:
-            self._heard.append(line.decode())
-
-    async def _end(self) -> None:
-        process, self._process = self._process, None
-        if process is None or self._reading is None:
-            return
-        if process.returncode is None:
-            process.kill()
-        await process.wait()
-        await self._reading

@@ -20,8 +20,8 @@ from itertools import pairwise
 from typing import Any
 
 import psutil
-from console import busy_s, percent
-from measuring import BIN, MISSION_XML, percentile, report
+from console import percent
+from measuring import BIN, MISSION_XML, busy_s, percentile, report
 from missions import RealMission, mission_up, own_processes
 from websockets.asyncio.client import ClientConnection, connect
 
