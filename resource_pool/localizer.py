@@ -33,15 +33,7 @@ from resource_pool.begin_places import read_begins
 from resource_pool.commands import Halt, Jump
 from resource_pool.dead_reckoning import Belief, DeadReckoning, FloorPose
 from resource_pool.floor_plans import board, plan_of, sighted_from
-from resource_pool.localization import (
-    AskFloorPlan,
-    AskHome,
-    AskPose,
-    FloorPlan,
-    LandmarkSighting,
-    Pose,
-    UnknownPlace,
-)
+from resource_pool.localization import AskFloorPlan, AskHome, AskPose, FloorPlan, LandmarkSighting, Pose, UnknownPlace
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, Readings
 from resource_pool.rc_readings import watch_readings
 from resource_pool.resource_controller import RcParameters, ResourceController

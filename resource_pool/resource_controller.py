@@ -46,12 +46,7 @@ from resource_pool.commands import Command
 from resource_pool.driver_adjusting import adjust_changed
 from resource_pool.driver_exchange import DriverExchanges
 from resource_pool.driver_slot import Again, DriverSlot, Judge, always, as_returned
-from resource_pool.drivers.interface import (
-    DriverSite,
-    HardwareFault,
-    build_driver,
-    options_of_drivers,
-)
+from resource_pool.drivers.interface import DriverSite, HardwareFault, build_driver, options_of_drivers
 from resource_pool.hold_ends import FAULTS, SAFE_WITHIN_S, HoldEnds, detail_of
 from resource_pool.holds import Hold, HoldTable
 from resource_pool.messages import Applied, ImpossibleUse, NotFromYou

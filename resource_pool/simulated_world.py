@@ -19,13 +19,7 @@ from backbone.exchange_course import UNPROVED
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.world_messages import (
-    AskWorld,
-    RadioPacket,
-    ReplyOnAir,
-    WorldModel,
-    WorldState,
-)
+from resource_pool.drivers.world_messages import AskWorld, RadioPacket, ReplyOnAir, WorldModel, WorldState
 from resource_pool.floor_plans import plan_of
 from resource_pool.localization import AskFloorPlan, AskHome, AskPose, Pose
 from scout_model.air import antenna_m, distance_m

@@ -9,14 +9,7 @@ from typing import Annotated
 
 from backbone.component.messages import Stopper
 from backbone.errors import Refusal
-from backbone.ranges import (
-    FEW,
-    Count,
-    Instant,
-    Line,
-    Mention,
-    Text,
-)
+from backbone.ranges import FEW, Count, Instant, Line, Mention, Text
 from backbone.wire import Message
 
 

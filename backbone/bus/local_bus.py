@@ -29,15 +29,7 @@ from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
 from backbone.quality import NEVER_DROPPED
 from backbone.waiting import settle
-from backbone.wire import (
-    Accepts,
-    Envelope,
-    MalformedMessage,
-    Message,
-    Refused,
-    UnknownMessage,
-    schema_of,
-)
+from backbone.wire import Accepts, Envelope, MalformedMessage, Message, Refused, UnknownMessage, schema_of
 
 ADDRESSES_KEPT = 4096  # chosen: more than a mission of 100 robots has
 

@@ -33,15 +33,7 @@ from backbone.mission.model import (
     MissionDescription,
 )
 from backbone.mission.room_files import floor_plan_text, room_text
-from backbone.mission.tables import (
-    CORE_SERVICES,
-    FLOOR_PLAN,
-    NETWORK_ID,
-    ROOM,
-    SIMULATED,
-    WORLD,
-    parameter_value,
-)
+from backbone.mission.tables import CORE_SERVICES, FLOOR_PLAN, NETWORK_ID, ROOM, SIMULATED, WORLD, parameter_value
 
 NOTHING_KNOWN = ClassFacts()
 

@@ -9,15 +9,7 @@ from collections.abc import Iterator, Mapping
 import msgspec
 
 from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
-from backbone.component.messages import (
-    AskState,
-    AskTime,
-    ComponentState,
-    MissionTime,
-    Register,
-    Registered,
-    StoryEvent,
-)
+from backbone.component.messages import AskState, AskTime, ComponentState, MissionTime, Register, Registered, StoryEvent
 from backbone.errors import Refusal
 from backbone.keys import Conversation, address_of
 from backbone.mission_log.log import AskLog, MissionLog

@@ -12,14 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from backbone.ranges import MOST_STREAMS
 from backbone.scheduling.entries import CONNECTED
-from backbone.scheduling.requests import (
-    CapacityExceeded,
-    RcUse,
-    SchedulingRefusal,
-    SchedulingRequest,
-    UnknownRc,
-    Usage,
-)
+from backbone.scheduling.requests import CapacityExceeded, RcUse, SchedulingRefusal, SchedulingRequest, UnknownRc, Usage
 from backbone.scheduling.response_time import admissible, remedy
 from backbone.scheduling.run_times import require_runtime
 from backbone.scheduling.state import ScheduleState

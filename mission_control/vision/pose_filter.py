@@ -9,12 +9,7 @@ from __future__ import annotations
 import math
 
 from mission_control.vision.landmark import Sighting
-from mission_control.vision.target_pose import (
-    PIXEL_ERROR_PX,
-    TargetPose,
-    estimate_poses,
-    refine_pose,
-)
+from mission_control.vision.target_pose import PIXEL_ERROR_PX, TargetPose, estimate_poses, refine_pose
 
 FORGETTING = 0.97  # chosen: one second of pictures decides between the two sides
 REFUTED_PX = 1.0  # chosen: four times a disc's error; above it the pose no longer explains the sighting

@@ -17,14 +17,7 @@ from backbone.errors import Refusal
 from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.edit import Path, outline
 from backbone.mission.reader import MissionInvalid
-from ui_console.design.answers import (
-    AskAnswer,
-    FileChangedAnswer,
-    NoticeAnswer,
-    RefusalAnswer,
-    SavedAnswer,
-    TextAnswer,
-)
+from ui_console.design.answers import AskAnswer, FileChangedAnswer, NoticeAnswer, RefusalAnswer, SavedAnswer, TextAnswer
 from ui_console.design.catalogue import entries
 from ui_console.design.changes import ChangedMeanwhile, MustAsk, changed, sections, sibling_file, touched_by
 from ui_console.design.commands import DesignRefused

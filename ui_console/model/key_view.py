@@ -7,14 +7,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 
 from backbone.printable_text import printable
-from ui_console.model.message_views import (
-    LONGEST_TEXT,
-    FieldRow,
-    MessageView,
-    PixelPicture,
-    Views,
-    field_rows,
-)
+from ui_console.model.message_views import LONGEST_TEXT, FieldRow, MessageView, PixelPicture, Views, field_rows
 from ui_console.model.series import SPAN_S, Series
 
 MOST_SERIES = 200  # chosen: the largest number of rows of a message

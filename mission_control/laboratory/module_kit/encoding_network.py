@@ -12,16 +12,7 @@ from backbone.bus.interface import Answer, Clock, Reply
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.errors import Refusal
 from backbone.keys import Conversation
-from backbone.wire import (
-    MAX_MESSAGE_BYTES,
-    WIRE_VERSION,
-    Envelope,
-    Message,
-    Reader,
-    Refused,
-    UnwritableMessage,
-    write,
-)
+from backbone.wire import MAX_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, Reader, Refused, UnwritableMessage, write
 
 
 class EncodingNetwork(LocalNetwork):
