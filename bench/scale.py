@@ -30,6 +30,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import psutil
 from idle import name_of
 from measuring import BIN, busy_s, percentile, report
@@ -37,18 +38,15 @@ from missions import RealMission, mission_up, own_processes
 from scale_mission import NAME, SETTLE_S, SHARING, components, mission_file
 from switch_time import switches_s
 
-from backbone import run_files
 from backbone.addresses import RC_MANAGER
-from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
-from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.component.launch import Launch
+from backbone.command_line.where import Where
 from backbone.component.messages import AskState, AskStatistics, ComponentState, Statistics
 from backbone.errors import BackboneError
 from backbone.launcher.mission_connection import connected
-from backbone.naming import Subsystem
 from ui_console.model.driving import DriveWish
 from ui_console.model.events import Asked, CommandApplied, ConsoleEvent
+from ui_console.session.joining import join
 from ui_console.session.teleoperation import Teleoperation
 
 SIZES = [3, 10, 30, 60, 100]
@@ -152,20 +150,8 @@ async def questions_s(bus: Bus, seconds: float) -> list[float]:
 
 async def take_over(robot: str, number: int) -> float:
     """Attach to a robot as a console does, turn it, release it; return the seconds until it obeyed."""
-    found = run_files.find(NAME)
-    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
-    launch = Launch(
-        NAME,
-        Subsystem.UI_CONSOLE,
-        f"console-{number}",
-        "console",
-        "ui_console.session.teleoperation:Teleoperation",
-        found.host,
-        found.endpoint,
-        found.clock_origin_monotonic_s,
-        found.clock_rate,
-        {"robot": robot, "kind": "drive", "priority": 100},
-    )
+    joining = await join(Where(NAME, None, None), {"robot": robot, "kind": "drive", "priority": 100})
+    launch, clock = msgspec.structs.replace(joining.launch, name=f"console-{number}"), joining.clock
     events: list[ConsoleEvent] = []
 
     async def drive(console: Teleoperation) -> None:
@@ -175,8 +161,7 @@ async def take_over(robot: str, number: int) -> float:
         await console.do(DriveWish(0, 0))
         await console.give_back()
 
-    config = client_config(found.endpoint, run_files.secret(found))
-    own = await ZenohBus.open_when_up(NAME, launch.address, clock, config)
+    own = await joining.open_bus(launch)
     async with asyncio.timeout(TAKE_OVER_WITHIN_S):
         await Teleoperation(launch, own, clock, show=events.append, work=drive, watches=False).run()
     asked = next(event.at_s for event in events if isinstance(event, Asked))

@@ -9,14 +9,13 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager, suppress
 from typing import Any
 
+import msgspec
 from stops_places import OTHERS, ROBOT
 
-from backbone import run_files
 from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
-from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.component.launch import Launch
+from backbone.command_line.where import Where
 from backbone.errors import LinkError
 from backbone.keys import Conversation
 from backbone.launcher.mission_connection import connected
@@ -28,6 +27,7 @@ from backbone.wire import Envelope
 from resource_pool.arc_client import OtherStop, StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.localization import AskPose, Pose
 from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DriveWish
+from ui_console.session.joining import Joining, join
 from ui_console.session.teleoperation import Teleoperation
 
 ROBOTS = (*OTHERS, ROBOT)
@@ -106,24 +106,19 @@ def _differs(one: Pose, other: Pose) -> bool:
 class Operator:
     """Another operator, in this process, on a bus of their own; keeps the ARC, so that taking is quick."""
 
-    def __init__(self, name: str, robot: str, priority: int, found: run_files.RunFile, clock: MissionClock) -> None:
+    def __init__(self, name: str, robot: str, priority: int, joining: Joining) -> None:
         parameters = {"robot": robot, "kind": "drive", "priority": priority, "minimum_runtime_s": 0.1}
-        self.robot, self._clock, self._found = robot, clock, found
-        self.launch = Launch(
-            *(found.mission, Subsystem.UI_CONSOLE, name, "console", "in this process", found.host, found.endpoint),
-            *(found.clock_origin_monotonic_s, found.clock_rate, parameters),
-        )
+        self.robot, self._joining = robot, joining
+        self.launch = msgspec.structs.replace(joining.launch, name=name, parameters=parameters)
         self.console: Teleoperation
         self._turning: asyncio.Task[None] | None = None
 
     @asynccontextmanager
     async def present(self) -> AsyncIterator[Operator]:
         """Be present until the block ends."""
-        bus = await ZenohBus.open_when_up(
-            self._found.mission, self.launch.address, self._clock, client_config(self._found.endpoint)
-        )
+        bus, clock = await self._joining.open_bus(self.launch), self._joining.clock
         self.console = Teleoperation(
-            self.launch, bus, self._clock, show=lambda _event: None, takes=False, watches=False, keeps_arc=True
+            self.launch, bus, clock, show=lambda _event: None, takes=False, watches=False, keeps_arc=True
         )
         living = asyncio.create_task(self.console.run(), name=self.launch.name)
         try:
@@ -253,10 +248,10 @@ class World:
 @asynccontextmanager
 async def world_of(mission: str) -> AsyncIterator[World]:
     """Watch the mission's robots, and run other operators, until the block ends."""
-    found = run_files.find(mission)
+    joining = await join(Where(mission, None, None))
     wishes = [*((f"driver-{robot}", robot, HIGH) for robot in OTHERS), ("holder", ROBOT, HIGH), ("asker", ROBOT, LOW)]
     async with connected(mission, None, address(Subsystem.UI_CONSOLE, "table")) as (bus, clock):
-        operators = [Operator(*wish, found, clock) for wish in wishes]
+        operators = [Operator(*wish, joining) for wish in wishes]
         world = World(bus, clock, operators)
         watching = asyncio.create_task(world.poses.watch(), name="poses")
         try:
