@@ -131,20 +131,17 @@ def motion_of_wheels(left_rad_s: float, right_rad_s: float) -> tuple[float, floa
 class Firmware:
     """One Scout's on-board program; wheels at rest, transmitter off and spring wound at the beginning."""
 
+    frequency = ""
+    """Frequency of the transmitter; empty while it is off."""
+
     def __init__(self) -> None:
         self._left_rad_s = self._right_rad_s = 0.0
-        self._frequency = ""
         self._heard_s = 0.0
         self.spring = Spring.WOUND
         """Phase of the spring foot's jump."""
         self._spring_since_s = 0.0
         self._let_out_m = 0.0
         self._heard = self._malformed = self._refused_jumps = self._timeouts = 0
-
-    @property
-    def frequency(self) -> str:
-        """Frequency of the transmitter; empty while it is off."""
-        return self._frequency
 
     def statistics(self) -> FirmwareStatistics:
         """Return the counts so far."""
@@ -172,9 +169,9 @@ class Firmware:
             case JumpPacket():
                 self._jump(now_s)
             case TransmitterOn(frequency):
-                self._frequency = frequency
+                self.frequency = frequency
             case TransmitterOff():
-                self._frequency = ""
+                self.frequency = ""
             case Safe():
                 self._safe(now_s)
             case _:
@@ -182,7 +179,7 @@ class Firmware:
 
     def tick(self, now_s: float) -> Actuation:
         """Advance watchdog and jump to this time and return the actuator controls."""
-        is_active = self._left_rad_s or self._right_rad_s or self._frequency or self.spring is Spring.PRELOADING
+        is_active = self._left_rad_s or self._right_rad_s or self.frequency or self.spring is Spring.PRELOADING
         if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
             self._timeouts += 1
             self._safe(now_s)
@@ -196,7 +193,7 @@ class Firmware:
 
     def _safe(self, now_s: float) -> None:
         self._halt(now_s)
-        self._frequency = ""
+        self.frequency = ""
 
     def _jump(self, now_s: float) -> None:
         if self.spring is not Spring.WOUND:
@@ -290,9 +287,9 @@ class Scout(Firmware):
             self._actuation = self._actuation._replace(left_rad_s=0.0, right_rad_s=0.0)
         else:
             self._actuation = self.tick(now_s)
-            if (draws := (self._load, bool(self._frequency))) != self._draws:
+            if (draws := (self._load, bool(self.frequency))) != self._draws:
                 self._draws = draws
-                self.battery.draw(_CONSUMPTION.power_w(self._load, is_transmitting=bool(self._frequency)), now_s)
+                self.battery.draw(_CONSUMPTION.power_w(self._load, is_transmitting=bool(self.frequency)), now_s)
         return {
             "left_wheel": self._actuation.left_rad_s,
             "right_wheel": self._actuation.right_rad_s,

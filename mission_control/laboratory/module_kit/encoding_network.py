@@ -6,13 +6,12 @@ processes is refused at its sender.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
+from backbone.bus.inbox import reader_of
 from backbone.bus.interface import Answer, Clock, Reply
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.errors import Refusal
 from backbone.keys import Conversation
-from backbone.wire import MAX_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, Reader, Refused, UnwritableMessage, write
+from backbone.wire import MAX_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, Refused, UnwritableMessage, write
 
 
 class EncodingNetwork(LocalNetwork):
@@ -72,9 +71,3 @@ def check_sendable(message: Message, most_bytes: int = MAX_MESSAGE_BYTES) -> Non
         told = f"{type(message).__name__} cannot be sent: {error}"
         raise UnwritableMessage(told, remedy="Give fields of the declared types, and memory without gaps.") from error
     reader_of(type(message)).read(raw, most_bytes)
-
-
-@lru_cache(maxsize=1024)
-def reader_of(kind: type[Message]) -> Reader[Message]:
-    """Return a reader of this class, the same at each call."""
-    return Reader(kind)

@@ -17,10 +17,10 @@ import typing
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from backbone.bus.inbox import reader_of
 from backbone.errors import Refusal
 from backbone.naming import did_you_mean
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, write
-from mission_control.laboratory.module_kit.encoding_network import reader_of
 from mission_control.modules.exchangeable import is_of
 from mission_control.modules.module import Module, default_name
 from mission_control.modules.orders import is_message

@@ -71,6 +71,9 @@ _FELT_NOTHING: dict[str, Sequence[float]] = {
 class Rover:
     """A Pioneer 2-class rover; at the beginning it stands, transmitter off, gripper open and down."""
 
+    frequency = ""
+    """Frequency of its transmitter; empty while it is off."""
+
     def __init__(self) -> None:
         self.battery = Battery(BATTERY_J)
         """The battery."""
@@ -78,7 +81,6 @@ class Rover:
         self._forward_m_s = self._turn_rad_s = 0.0
         self._grip = GripPacket(0.0, 0.0)
         self._paddles_m = self._lift_m = 0.0
-        self._frequency = ""
         self._readings: Mapping[str, Sequence[float]] = _FELT_NOTHING
         self._is_blocked = False
         self._heard_s = self._now_s = 0.0
@@ -88,11 +90,6 @@ class Rover:
     def body_mjcf(cls) -> str:
         """Return the body; see ``scout_model.robot.Robot``."""
         return resources.files("resource_pool.robots.rover").joinpath("body.xml").read_text(encoding="utf-8")
-
-    @property
-    def frequency(self) -> str:
-        """Frequency of its transmitter; empty while it is off."""
-        return self._frequency
 
     @property
     def motors(self) -> float:
@@ -121,12 +118,12 @@ class Rover:
                 self._ask(_STAND)
                 self._grip = GripPacket(self._paddles_m / PADDLES_M, self._lift_m / LIFT_M)
             case TransmitterOn(frequency):
-                self._frequency = frequency
+                self.frequency = frequency
             case TransmitterOff():
-                self._frequency = ""
+                self.frequency = ""
             case Safe():
                 self._ask(_STAND)
-                self._frequency = ""
+                self.frequency = ""
             case _:
                 assert_never(packet)
 
@@ -143,7 +140,7 @@ class Rover:
             self._watch(now_s)
             self._brake_at_bumpers()
             self._advance(past_s)
-            self.battery.draw(CONSUMPTION.power_w(self._load(), is_transmitting=bool(self._frequency)), now_s)
+            self.battery.draw(CONSUMPTION.power_w(self._load(), is_transmitting=bool(self.frequency)), now_s)
         rim_m_s = self._turn_rad_s * TRACK_M / 2
         return {
             "left_wheel": (self._forward_m_s - rim_m_s) / WHEEL_RADIUS_M,
@@ -176,13 +173,13 @@ class Rover:
     def _switch_off(self) -> None:
         self._asked = _STAND
         self._forward_m_s = self._turn_rad_s = 0.0
-        self._frequency = ""
+        self.frequency = ""
 
     def _watch(self, now_s: float) -> None:
-        is_active = self._asked != _STAND or self._frequency
+        is_active = self._asked != _STAND or self.frequency
         if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
             self._timeouts += 1
-            self._asked, self._frequency = _STAND, ""
+            self._asked, self.frequency = _STAND, ""
 
     def _brake_at_bumpers(self) -> None:
         is_pressed = any(self._readings[bumper][0] > 0.0 for bumper in _FRONT_BUMPERS)

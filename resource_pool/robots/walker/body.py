@@ -38,13 +38,16 @@ STANDING: Angles = (0.0,) * len(JOINTS)
 class Walker:
     """A four-legged robot's program; at the beginning the robot stands, transmitter off, battery full."""
 
+    frequency = ""
+    """Frequency of its transmitter; empty while it is off."""
+    motors = 0.0
+    """Average speed of its servos, 0 to 1 of their limit."""
+
     def __init__(self) -> None:
-        self._frequency = ""
         self._targets_rad = self._driven_rad = STANDING
         self._arrive_s = 0.0
         self._heard_s = 0.0
         self._ticked_s = -1.0
-        self._motors = 0.0
         self._charge_j = CHARGE_J
         self._has_felt = False
         self._tilt_rad = (0.0, 0.0)
@@ -57,16 +60,6 @@ class Walker:
     def body_mjcf(cls) -> str:
         """Return the body; see ``scout_model.robot.Robot``."""
         return resources.files("resource_pool.robots.walker").joinpath("body.xml").read_text(encoding="utf-8")
-
-    @property
-    def frequency(self) -> str:
-        """Frequency of its transmitter; empty while it is off."""
-        return self._frequency
-
-    @property
-    def motors(self) -> float:
-        """Average speed of its servos, 0 to 1 of their limit."""
-        return self._motors
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of packets obeyed, malformed packets and interventions of the watchdog."""
@@ -87,22 +80,22 @@ class Walker:
             case HaltPacket():
                 self._stand(now_s)
             case TransmitterOn(frequency):
-                self._frequency = frequency
+                self.frequency = frequency
             case TransmitterOff():
-                self._frequency = ""
+                self.frequency = ""
             case Safe():
                 self._stand(now_s)
-                self._frequency = ""
+                self.frequency = ""
             case _:
                 assert_never(packet)
 
     def controls(self, now_s: float) -> dict[str, float]:
         """Advance to this time and return the servos' targets by actuator."""
-        is_active = self._targets_rad != STANDING or self._frequency
+        is_active = self._targets_rad != STANDING or self.frequency
         if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
             self._timeouts += 1
             self._stand(now_s)
-            self._frequency = ""
+            self.frequency = ""
         if now_s > self._ticked_s:
             self._move(self._arrive_s - now_s)
             self._ticked_s = now_s
@@ -138,8 +131,8 @@ class Walker:
             for target, driven in zip(self._targets_rad, before_rad, strict=True)
         )
         way_rad = sum(abs(after - before) for after, before in zip(self._driven_rad, before_rad, strict=True))
-        self._motors = way_rad / (MOST_WAY_RAD * len(JOINTS))
-        self._charge_j = max(0.0, self._charge_j - (IDLE_W + SERVOS_W * self._motors) * TICK_S)
+        self.motors = way_rad / (MOST_WAY_RAD * len(JOINTS))
+        self._charge_j = max(0.0, self._charge_j - (IDLE_W + SERVOS_W * self.motors) * TICK_S)
 
 
 def _tilt_rad(w: float, x: float, y: float, z: float) -> tuple[float, float]:
