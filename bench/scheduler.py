@@ -8,25 +8,22 @@ Beside it, for fleets that a constraint solver can handle in seconds: how many A
 served, compared with a solver bound by the same rules and one free of them (``scheduler_solver.py``; needs the extra
 ``bench``).
 
-Prints one JSON line for the headline sizes. ``--table`` prints how the time grows, ``--profile`` which functions use
-it. ``--arcs N --rcs M --shape S`` measure one size. ``--no-solver`` and ``--only-solver`` skip one half.
+Prints one JSON line for the headline sizes. ``--table`` prints how the time grows. ``--arcs N --rcs M --shape S``
+measure one size. ``--no-solver`` and ``--only-solver`` skip one half.
 """
 
 from __future__ import annotations
 
 import argparse
-import cProfile
-import pstats
 import sys
-from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from random import Random
 from time import perf_counter
 from typing import Any
 
 from measuring import percentile, report
-from scheduler_instances import MISSION, SHAPES, Fleet, fleet
+from scheduler_instances import KINDS, MISSION, SHAPES, Fleet, Stopwatch, TooSlow, fleet
 
 try:
     import scheduler_solver
@@ -35,7 +32,7 @@ except ModuleNotFoundError as missing:
         raise
     scheduler_solver = None
 
-from backbone.scheduling.events import Departed, Event, Freed, Instruction, Opened, Requested, Woken
+from backbone.scheduling.events import Departed
 from backbone.scheduling.rehearsal import Rehearsal, Timetable
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
@@ -45,47 +42,8 @@ HEADLINE = ((30, 20), (10_000, 1000))
 SOLVED_SIZES = ((30, 20), (100, 50), (400, 100))
 SOLVED_SLOTS = 24  # chosen: two minutes of the papers' slices
 AIMS_MS = {30: {"p50": 0.5}, 10_000: {"p50": 5.0, "p99": 20.0}}
-KINDS: dict[type[Event], str] = {
-    Requested: "request",
-    Departed: "release",
-    Woken: "slice_end",
-    Freed: "freed",
-    Opened: "opened",
-}
 ARRIVALS_S = 5.0  # chosen: one slice, so that slice ends are spread over time
 CHANGES_S = 15.0  # chosen: mission time between two changes times RCs; about as many changes as slice ends
-
-
-class TooSlow(Exception):
-    """The wall time for this size is used up."""
-
-
-@dataclass
-class Stopwatch:
-    """A schedule manager with the durations of its decisions.
-
-    Attributes:
-        manager: The schedule manager.
-        ends_at: ``perf_counter`` value at which the measurement is abandoned.
-        times_s: Kind of event → seconds, decision by decision.
-    """
-
-    manager: ScheduleManager
-    ends_at: float
-    times_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
-
-    def handle(self, event: Event, now_s: float) -> list[Instruction]:
-        """Decide, and record the duration.
-
-        Raises:
-            TooSlow: The wall time was used up before.
-        """
-        began = perf_counter()
-        if began > self.ends_at:
-            raise TooSlow
-        told = self.manager.handle(event, now_s)
-        self.times_s[KINDS.get(type(event), "other")].append(perf_counter() - began)
-        return told
 
 
 @dataclass
@@ -273,7 +231,6 @@ def main() -> None:
     parser.add_argument("--solve-within", type=float, default=1.0, help="seconds for one choice of the solver")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--table", action="store_true", help="all sizes and shapes, for people")
-    parser.add_argument("--profile", action="store_true", help="print the 25 functions most time went to, on stderr")
     half = parser.add_mutually_exclusive_group()
     half.add_argument("--no-solver", action="store_true", help="only the time of decisions")
     half.add_argument("--only-solver", action="store_true", help="only the comparison with the solver")
@@ -283,19 +240,13 @@ def main() -> None:
     if chosen.arcs is not None:
         sizes = solved_sizes = ((chosen.arcs, chosen.rcs or max(20, chosen.arcs // 10)),)
     shapes = chosen.shape or (SHAPES if chosen.table else SHAPES[:1])
-    profile = cProfile.Profile()
-    if chosen.profile:
-        profile.enable()
     measured = [
         measure(fleet(shape, rcs, chosen.seed), arcs, events=chosen.events, within_s=chosen.within, seed=chosen.seed)
         for shape in shapes
         for arcs, rcs in ([] if chosen.only_solver else sizes)
     ]
-    if chosen.profile:
-        profile.disable()
-        pstats.Stats(profile, stream=sys.stderr).sort_stats("tottime").print_stats(25)
     # A single size is passed to the solver only with --only-solver, because its time grows without limit.
-    with_solver = chosen.only_solver or (chosen.arcs is None and not chosen.no_solver and not chosen.profile)
+    with_solver = chosen.only_solver or (chosen.arcs is None and not chosen.no_solver)
     compared = solve(shapes, solved_sizes, chosen.solve_within, chosen.within, chosen.seed) if with_solver else []
     if chosen.table:
         print("\n\n".join(filter(None, [measured and table(measured), compared and solver_table(compared)])))

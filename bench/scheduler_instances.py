@@ -1,4 +1,6 @@
-"""Seeded fleets for ``scheduler.py``: many ARCs that need two to four RCs each, in several shapes.
+"""Seeded fleets for ``scheduler.py``, and a schedule manager whose decisions are timed.
+
+Many ARCs need two to four RCs each, in several shapes:
 
 * ``uniform``: any RCs; with many ARCs nearly all of them form one group.
 * ``cells``: robots in cells of eight RCs; no robot needs an RC of another cell: many small groups.
@@ -9,12 +11,15 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from random import Random
+from time import perf_counter
 
-from backbone.scheduling.events import RcKnown, Requested
+from backbone.scheduling.events import Departed, Event, Freed, Instruction, Opened, RcKnown, Requested, Woken
 from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
+from backbone.scheduling.schedule_manager import ScheduleManager
 
 MISSION = "fleet"
 SHAPES = ("uniform", "cells", "hub", "tree", "radio")
@@ -24,6 +29,45 @@ CELL_RCS = 8  # chosen: two robots and their frequencies
 RCS_OF_A_HUB = 20  # chosen: RCs for each RC that every ARC needs
 RCS_OF_A_RADIO = 20  # chosen: RCs for each radio
 LEVELS = 3
+KINDS: dict[type[Event], str] = {
+    Requested: "request",
+    Departed: "release",
+    Woken: "slice_end",
+    Freed: "freed",
+    Opened: "opened",
+}
+
+
+class TooSlow(Exception):
+    """The wall time for this size is used up."""
+
+
+@dataclass
+class Stopwatch:
+    """A schedule manager with the durations of its decisions.
+
+    Attributes:
+        manager: The schedule manager.
+        ends_at: ``perf_counter`` value at which the measurement is abandoned.
+        times_s: Kind of event → seconds, decision by decision.
+    """
+
+    manager: ScheduleManager
+    ends_at: float
+    times_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+    def handle(self, event: Event, now_s: float) -> list[Instruction]:
+        """Decide, and record the duration.
+
+        Raises:
+            TooSlow: The wall time was used up before.
+        """
+        began = perf_counter()
+        if began > self.ends_at:
+            raise TooSlow
+        told = self.manager.handle(event, now_s)
+        self.times_s[KINDS.get(type(event), "other")].append(perf_counter() - began)
+        return told
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from time import perf_counter
 
 import msgspec
 from ortools.sat.python import cp_model
-from scheduler_instances import MISSION, Fleet
+from scheduler_instances import MISSION, Fleet, Stopwatch, TooSlow
 
-from backbone.scheduling.events import Event, Instruction, Requested
+from backbone.scheduling.events import Requested
 from backbone.scheduling.priority import Path, higher
 from backbone.scheduling.rehearsal import Rehearsal, Timetable
 from backbone.scheduling.requests import RcUse
@@ -143,28 +143,6 @@ class Comparison:
         }
 
 
-class OutOfTime(Exception):
-    """The schedule manager took longer than allowed."""
-
-
-@dataclass
-class _Limited:
-    """A schedule manager with a deadline in ``perf_counter`` time."""
-
-    manager: ScheduleManager
-    ends_at: float
-
-    def handle(self, event: Event, now_s: float) -> list[Instruction]:
-        """Decide.
-
-        Raises:
-            OutOfTime: It took too long.
-        """
-        if perf_counter() > self.ends_at:
-            raise OutOfTime
-        return self.manager.handle(event, now_s)
-
-
 def compare(of: Fleet, arcs: int, *, slots: int, solve_s: float, within_s: float) -> Comparison:
     """Return the outcomes of the three ways on one fleet.
 
@@ -221,7 +199,7 @@ def largest_choice(of: Fleet, wishes: Sequence[Wish], *, solve_s: float, rules: 
         rules: Rules by which an ARC may be left out only with an excuse; None: no rules.
 
     Raises:
-        OutOfTime: The solver found no choice.
+        TooSlow: The solver found no choice.
     """
     model = cp_model.CpModel()
     runs = [model.new_bool_var(f"runs {number}") for number in range(len(wishes))]
@@ -241,7 +219,7 @@ def largest_choice(of: Fleet, wishes: Sequence[Wish], *, solve_s: float, rules: 
     solver.parameters.num_workers = 1
     status = solver.solve(model)
     if status not in {cp_model.OPTIMAL, cp_model.FEASIBLE}:
-        raise OutOfTime
+        raise TooSlow
     arcs = frozenset(number for number, variable in enumerate(runs) if solver.value(variable))
     return Choice(arcs, int(solver.best_objective_bound + 1e-6))
 
@@ -305,14 +283,14 @@ def _ours(
 ) -> Outcome | None:
     began = perf_counter()
     manager = ScheduleManager(SchedulingRules(grace_s=0.0), tolerance_s=1e-6, mission=MISSION, mission_priority=0)
-    rehearsal = Rehearsal(_Limited(manager, began + within_s))
+    rehearsal = Rehearsal(Stopwatch(manager, began + within_s))
     try:
         for rc in of.rcs:
             rehearsal.tell(rc)
         for request, at_s in zip(requests, arrivals_s, strict=True):
             rehearsal.at(at_s, request)
         rehearsal.run(slots * SLICE_S)
-    except OutOfTime:
+    except TooSlow:
         return None
     seen = Timetable(rehearsal.trace, rehearsal.now_s)
     load = seen.utilization()
