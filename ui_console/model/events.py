@@ -253,7 +253,6 @@ Said = (
     | SetParameter
     | Pose
     | FloorPlan
-    | Types
     | Suspended
     | Why
 )
