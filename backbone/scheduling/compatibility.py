@@ -6,7 +6,7 @@ An exclusive RC has one holder; on a sharable one every stream of every holder m
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 
 from backbone.scheduling.entries import ArcEntry, RcEntry
 from backbone.scheduling.precedence import by_precedence
@@ -41,21 +41,34 @@ class Compatibility:
         self._users = users
         self.admission: Analysis = admission
         self._usable: dict[ArcEntry, bool] = {}
-        self._admitted: dict[str, dict[frozenset[ArcEntry], bool]] = {}
+        self._admitted: dict[str, dict[Collection[Hashable], bool]] = {}
+        self._pairs: dict[ArcEntry, dict[ArcEntry, bool]] = {}
+        """ARC → another one at a sharable RC → whether it fits beside it."""
         self._roomy = roomy
 
     def fits(self, arc: ArcEntry, others: Iterable[ArcEntry]) -> bool:
         """Return whether the ARC can hold all its RCs together with these others."""
-        beside = []
+        touches, excludes, beside = arc.touches, arc.excludes, []
         for other in others:
-            common = arc.touches & other.touches
+            common = touches & other.touches
             if common:
-                if common & (arc.excludes | other.excludes):
+                if common & (excludes | other.excludes):
                     return False
                 beside.append(other)
-        return not arc.shares or all(
-            self.can_share(rc, [arc, *(other for other in beside if rc in other.uses)]) for rc in arc.shares
-        )
+        if not arc.shares:
+            return True
+        return self._fits_beside(arc, *beside) if len(beside) == 1 else self._fits_sharers(arc, beside)
+
+    def _fits_beside(self, arc: ArcEntry, other: ArcEntry) -> bool:
+        known = self._pairs.get(arc)
+        if known is None or len(known) >= SETS_REMEMBERED:  # it may hold ARCs that left while this one was idle
+            known = self._pairs[arc] = {}
+        if other not in known:
+            known[other] = self._fits_sharers(arc, [other])
+        return known[other]
+
+    def _fits_sharers(self, arc: ArcEntry, others: Sequence[ArcEntry]) -> bool:
+        return all(self.can_share(rc, [arc, *[other for other in others if rc in other.uses]]) for rc in arc.shares)
 
     def usable(self, arc: ArcEntry) -> bool:
         """Return whether the ARC could run alone: its RCs are up and can serve it."""
@@ -85,23 +98,36 @@ class Compatibility:
             self._roomy.pop(rc, None)
             self._admitted.pop(rc, None)
         self._usable.clear()
+        self._pairs.clear()
 
     def forget(self, arc: ArcEntry) -> None:
         """Drop the answers about an ARC that left."""
-        self._usable.pop(arc, None)
+        for kept in (self._usable, self._pairs):
+            kept.pop(arc, None)
         for rc in arc.uses:
+            users = self._users.get(rc, ())
+            for user in users:
+                self._pairs.get(user, {}).pop(arc, None)
+            left = {arc} if any(user.level is arc.level for user in users) else {arc, arc.level}
             known = self._admitted.get(rc, {})
-            for users in [users for users in known if arc in users]:
-                del known[users]
+            for key in [key for key in known if not left.isdisjoint(key)]:
+                del known[key]
 
     def _admissible(self, rc: str, users: Sequence[ArcEntry]) -> bool:
-        known = self._admitted.setdefault(rc, {})
-        key = frozenset(users)
+        known, key = self._admitted.setdefault(rc, {}), self._key(rc, users)
         if key not in known:
             if len(known) >= SETS_REMEMBERED:
                 known.clear()
             known[key] = self._serves(rc, users, [user.streams[rc] for user in users])
         return known[key]
+
+    def _key(self, rc: str, users: Sequence[ArcEntry]) -> Collection[Hashable]:
+        """Return all on which the answer about these users depends: of many pairs it is the same."""
+        if len(users) == 2:
+            one, other = users
+            if one.level.depth == other.level.depth:  # so their levels have one order
+                return (*one.streams[rc],), (*other.streams[rc],), one.level, other.level, one.name < other.name
+        return frozenset(users)
 
     def _serves(self, rc: str, users: Sequence[ArcEntry], demands: Sequence[Sequence[Stream]]) -> bool:
         capacity = self._rcs[rc].capacity

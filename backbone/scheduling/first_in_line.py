@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from backbone.scheduling.entries import INSTANT_S, SOON_S, ArcEntry
+from backbone.scheduling.priority import rank_of
 from backbone.scheduling.table import Table
 
 LOOK_AHEAD = 3  # chosen: length of a chain of first ARCs that wait for each other; beyond it only holders count
@@ -175,7 +176,7 @@ class FirstInLine:
             if delayed is not None:
                 return delayed
         users = dict.fromkeys(user for rc in arc.uses for user in self._state.users[rc] if user.queued)
-        higher_ones = [one for one in users if one.level is not arc.level and one.goes_before(arc)]
+        higher_ones = [one for one in users if one.level is not arc.level and rank_of(arc, one) < 0]
         others = [one for one in higher_ones if one not in firsts]
         if arc in firsts:
             # Equality is not transitive: two ARCs can each be first at a common RC. The lower one then waits.

@@ -9,7 +9,9 @@ Source: decision 0011.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
 from backbone.scheduling.estimate import estimate
@@ -19,6 +21,20 @@ from backbone.scheduling.preemption import in_the_way, must_let_higher_go_first
 from backbone.scheduling.priority import higher
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
+
+
+class _Blocked(NamedTuple):
+    """Until when a holder keeps an ARC from starting.
+
+    Attributes:
+        rc: An RC of both; every change of either is a change of it.
+        version: Version of that RC, and of the RCs' service, at that time.
+        until_s: End of the holder's slice; infinite: the holder changes before.
+    """
+
+    rc: str
+    version: int
+    until_s: float
 
 
 class LargeGroupPlanner:
@@ -39,6 +55,7 @@ class LargeGroupPlanner:
         self._by_time = table.state.fairness.discipline == "time"
         self._near: dict[str, None] = {}
         self._candidates: dict[ArcEntry, None] = {}
+        self._blocked: dict[ArcEntry, _Blocked] = {}
 
     def look_near(self, rc: str) -> None:
         """Examine, in the next decision, the ARCs that a change of this RC concerns."""
@@ -71,38 +88,60 @@ class LargeGroupPlanner:
         Behind a higher first in line, no reservation but this order keeps one of them from taking every gap.
         """
         self._examine()
-        table, fairness = self._table, self._state.fairness
-        waiting = [arc for arc in self._candidates if arc.state is RequestState.WAITING]
-        holders = {arc: table.holders(arc) for arc in waiting}
-        possible = [arc for arc in waiting if table.could_start(arc, holders[arc], now_s) and table.usable(arc)]
-        possible.sort(key=lambda arc: fairness.seniority(arc, now_s))
-        return {arc: holders[arc] for arc in possible}
+        table, state, blocked, soon_s = self._table, self._state, self._blocked, now_s + INSTANT_S
+        if len(blocked) > 2 * len(state.arcs):
+            blocked.clear()  # it may hold ARCs that left
+        possible: dict[ArcEntry, list[ArcEntry]] = {}
+        for arc in self._candidates:
+            if arc.state is not RequestState.WAITING:
+                continue
+            known = blocked.get(arc)
+            if (
+                known is not None
+                and soon_s < known.until_s
+                and known.version == state.rc_versions.get(known.rc, 0) + state.service_version
+            ):
+                continue
+            holders = table.holders(arc)
+            blocker = table.blocker(arc, holders, now_s)
+            if blocker is not None:
+                ends = blocker.state is RequestState.RUNNING and not blocker.goes_before(arc)
+                rc = next(rc for rc in arc.uses if rc in blocker.uses)
+                version = state.rc_versions.get(rc, 0) + state.service_version
+                blocked[arc] = _Blocked(rc, version, blocker.end_s if ends else math.inf)
+            elif table.usable(arc):
+                possible[arc] = holders
+        by_seniority = sorted(possible, key=lambda arc: state.fairness.seniority(arc, now_s))
+        return {arc: possible[arc] for arc in by_seniority}
 
     def _examine(self) -> None:
         """Make those ARCs candidates again that are concerned by changes since the last examination.
 
         These are the users of an RC, and ARCs that may wait for one of its users at another RC.
         """
-        users, held_alone = self._state.users, self._state.held_alone
+        users, bits, held_alone = self._state.users, self._state.bits, self._state.held_alone
+        firsts: dict[str, ArcEntry | None] = {}
         elsewhere: dict[str, None] = {}
         for rc in self._near:
             for arc in users.get(rc, ()):
                 if arc.state is RequestState.WAITING:
                     self._candidates[arc] = None
-                if arc.queued and arc.touches & ~held_alone:
-                    elsewhere.update((other, None) for other in arc.uses if self._may_hold_up(arc, other))
+                free = arc.touches & ~held_alone  # elsewhere the holder's slice is not over
+                if not free or not arc.queued:
+                    continue
+                for other in arc.uses:
+                    if not free & bits[other] or other in elsewhere:
+                        continue
+                    if other not in firsts:
+                        firsts[other] = self._firsts.at(other)
+                    first = firsts[other]
+                    if first is None or first is arc or first.level is not arc.level:
+                        elsewhere[other] = None  # an ARC may wait there only because this one is first in line
         for rc in elsewhere:
             for arc in users[rc]:
                 if arc.state is RequestState.WAITING and not arc.touches & held_alone:
                     self._candidates[arc] = None
         self._near.clear()
-
-    def _may_hold_up(self, arc: ArcEntry, rc: str) -> bool:
-        """Return whether another ARC may wait at this free RC only because this one is first in line."""
-        if self._state.held_alone & self._state.bits[rc]:
-            return False  # its holder's slice is not over
-        first = self._firsts.at(rc)
-        return first is None or first is arc or first.level is not arc.level
 
     def forgotten(self, group: Sequence[ArcEntry], now_s: float) -> ArcEntry | None:
         """Return None: the search for a forgotten turn here would take a plan of the whole group."""

@@ -86,7 +86,8 @@ _VALUES: dict[str, type[Any]] = {
 _ENUMS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (requests.RequestState, Afterwards)}
 _CACHES = {
     "WholeGroupPlanner": {"_plans"},
-    "Compatibility": {"_usable", "_admitted"},
+    "Compatibility": {"_usable", "_admitted", "_pairs"},
+    "LargeGroupPlanner": {"_blocked"},
     "FirstInLine": {"_changes", "_reserved", "_around", "_delayed"},
     "Level": {"ranks"},
     "TraceWriter": {"_story"},

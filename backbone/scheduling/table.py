@@ -18,9 +18,10 @@ from collections.abc import Callable, Iterable, Sequence
 from operator import attrgetter
 
 from backbone.scheduling.entries import INSTANT_S, SOON_S, ArcEntry
+from backbone.scheduling.fairness import Seniority
 from backbone.scheduling.planner import Turn
 from backbone.scheduling.precedence import by_precedence
-from backbone.scheduling.priority import rank_of
+from backbone.scheduling.priority import Level, rank_of
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.state import ScheduleState
 
@@ -67,10 +68,15 @@ class Table:
         """Return the first of ARCs of one group, at least one, in the order of rule 2."""
         if any(arc.reservation is not None for arc in arcs):
             return self.in_order(arcs)[0]
-        fairness, now_s = self.state.fairness, self.state.now_s
-        by_age = sorted(arcs, key=lambda arc: fairness.seniority(arc, now_s))
+        seniority, now_s = self.state.fairness.seniority, self.state.now_s
+        eldest: dict[Level, tuple[Seniority, int, ArcEntry]] = {}
+        for place, arc in enumerate(arcs):
+            one, known = (seniority(arc, now_s), place, arc), eldest.get(arc.level)
+            if known is None or one < known:
+                eldest[arc.level] = one
+        by_age = [arc for _, _, arc in sorted(eldest.values())]  # what is higher than one of a level is than all of it
         return next(
-            arc for arc in by_age if not any(other.level is not arc.level and other.goes_before(arc) for other in arcs)
+            arc for arc in by_age if not any(other.level is not arc.level and rank_of(other, arc) > 0 for other in arcs)
         )
 
     # Blockers (rule 4).
@@ -98,11 +104,18 @@ class Table:
 
     def holders(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the other ARCs that hold an RC of the ARC."""
-        rcs = self.state.rcs
-        return [*dict.fromkeys(holder for rc in arc.uses for holder in rcs[rc].holders if holder is not arc)]
+        rcs, holders = self.state.rcs, dict[ArcEntry, None]()
+        for rc in arc.uses:
+            holders.update(rcs[rc].holders)
+        holders.pop(arc, None)
+        return [*holders]
 
     def could_start(self, arc: ArcEntry, holders: Iterable[ArcEntry], now_s: float) -> bool:
         """Return whether none of these holders blocks the ARC beyond now."""
+        return self.blocker(arc, holders, now_s) is None
+
+    def blocker(self, arc: ArcEntry, holders: Iterable[ArcEntry], now_s: float) -> ArcEntry | None:
+        """Return the first of these holders that blocks the ARC beyond now; None if there is none."""
         touches, soon_s = arc.touches, now_s + INSTANT_S
         for holder in holders:
             if (
@@ -111,8 +124,8 @@ class Table:
                 and self.stands_until_s(holder, arc, now_s) > soon_s
                 and not self.fits(arc, [holder])
             ):
-                return False
-        return True
+                return holder
+        return None
 
     def line(
         self, group: Iterable[ArcEntry], now_s: float, order: Callable[[Iterable[ArcEntry]], list[ArcEntry]]

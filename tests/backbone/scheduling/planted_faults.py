@@ -242,6 +242,24 @@ FAULTS = [
         "if True:",
     ),
     Planted(
+        "an ARC of a large group counts as blocked although its blocker has changed",
+        "large_group.py",
+        "and known.version == state.rc_versions.get(known.rc, 0) + state.service_version",
+        "and True",
+    ),
+    Planted(
+        "an ARC of a large group counts as blocked although its blocker's slice is over",
+        "large_group.py",
+        "and soon_s < known.until_s",
+        "and True",
+    ),
+    Planted(
+        "a pair on a radio counts as another pair with other priorities",
+        "compatibility.py",
+        "one.level, other.level, one.name < other.name",
+        "one.name < other.name",
+    ),
+    Planted(
         "a slice ends although it is awaited by none",
         "slice_ends.py",
         "wanted = stands and self._is_waited_for(arc)",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from random import Random
 from typing import Any
 
@@ -11,11 +11,16 @@ from examples import share
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from random_missions import crowded_mission, fleet_mission, play
-from simulated_switches import Bench
+from simulated_switches import MISSION, Bench, ask, manager, sharable, states
 
-from backbone.scheduling import large_group
+from backbone.scheduling import large_group, master_schedule, state
+from backbone.scheduling.compatibility import Compatibility
 from backbone.scheduling.entries import ArcEntry
+from backbone.scheduling.events import Departed
 from backbone.scheduling.first_in_line import FirstInLine
+from backbone.scheduling.large_group import LargeGroupPlanner
+from backbone.scheduling.requests import RcUse, RequestState, Usage
+from backbone.scheduling.table import Table
 
 RULES: list[dict[str, Any]] = [{}, {"policy": "strict"}, {"discipline": "time"}, {"aging_s": 3.0}, {"grid_s": 2.0}]
 FLEET_S = 20.0
@@ -30,6 +35,27 @@ class Forgetful(FirstInLine):
         if self._state.fairness.discipline != "time":  # there a snapshot contains the first ARCs
             self._firsts.clear()
         super()._look(now_s)
+
+
+class ForgetfulPlanner(LargeGroupPlanner):
+    """Keeps nothing from one decision to the next, but the candidates."""
+
+    def __init__(self, table: Table, *, slack_s: float) -> None:
+        super().__init__(table, slack_s=slack_s)
+        self._firsts = Forgetful(table, slack_s=slack_s)
+
+    def _possible(self, now_s: float) -> dict[ArcEntry, list[ArcEntry]]:
+        self._blocked.clear()
+        return super()._possible(now_s)
+
+
+class ForgetfulCompatibility(Compatibility):
+    """Keeps no answer."""
+
+    def fits(self, arc: ArcEntry, others: Iterable[ArcEntry]) -> bool:
+        for kept in (self._usable, self._admitted, self._pairs):
+            kept.clear()
+        return super().fits(arc, others)
 
 
 def crowd(seed: int, rules: dict[str, Any]) -> Bench:
@@ -50,7 +76,8 @@ def test_a_planner_that_keeps_nothing_decides_the_same(
 ) -> None:
     expected = played(seed, rules).trace
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(large_group, "FirstInLine", Forgetful)
+        patch.setattr(master_schedule, "LargeGroupPlanner", ForgetfulPlanner)
+        patch.setattr(state, "Compatibility", ForgetfulCompatibility)
         assert played(seed, rules).trace == expected
 
 
@@ -66,3 +93,18 @@ def test_answers_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(5):
         fleet(seed, {})
     assert answers.count(True) > 100
+
+
+def test_a_pair_of_a_known_kind_with_other_priorities_is_another_pair() -> None:
+    urgent = RcUse([Usage(period_s=0.02, packet_time_s=0.001, deadline_s=0.005)])
+    two_long = RcUse([Usage(period_s=0.02, packet_time_s=0.003)] * 2)
+    bench = Bench(manager(), sharable("radio"))
+    for arc, use, priority in [("a", urgent, 2), ("b", two_long, 1)]:
+        bench.tell(ask(arc, {"radio": use}, path=[(MISSION, 0), (arc, priority)]))
+    assert states(bench.run(1.0)) == {"a": RequestState.RUNNING, "b": RequestState.RUNNING}
+    for arc in "ab":
+        bench.tell(Departed(arc))
+    for arc, use, priority in [("c", urgent, 1), ("d", two_long, 2)]:
+        bench.tell(ask(arc, {"radio": use}, path=[(MISSION, 0), (arc, priority)]))
+    assert states(bench.run(2.0)) == {"c": RequestState.WAITING, "d": RequestState.RUNNING}
+    assert bench.verdict() == []
