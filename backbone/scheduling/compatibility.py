@@ -57,14 +57,13 @@ class Compatibility:
                 beside.append(other)
         if not arc.shares:
             return True
-        return self._fits_beside(arc, *beside) if len(beside) == 1 else self._fits_sharers(arc, beside)
-
-    def _fits_beside(self, arc: ArcEntry, other: ArcEntry) -> bool:
-        known = self._pairs.get(arc)
+        if len(beside) != 1:
+            return self._fits_sharers(arc, beside)
+        (other,), known = beside, self._pairs.get(arc)
         if known is None or len(known) >= SETS_REMEMBERED:  # it may hold ARCs that left while this one was idle
             known = self._pairs[arc] = {}
         if other not in known:
-            known[other] = self._fits_sharers(arc, [other])
+            known[other] = self._fits_sharers(arc, beside)
         return known[other]
 
     def _fits_sharers(self, arc: ArcEntry, others: Sequence[ArcEntry]) -> bool:
