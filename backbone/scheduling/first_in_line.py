@@ -198,7 +198,8 @@ class FirstInLine:
         fits, end_s, shared = self._table.fits, self._must_be_done_s(arc, now_s), arc.touches & ~arc.excludes
         crowd = [holder for holder in holders if holder.touches & shared and fits(arc, [holder])]
         for other in others:
-            if other is not arc and not fits(arc, [other, *crowd]) and self._table.usable(other):
+            beside = dict.fromkeys([other, *crowd])  # a holder that is being revoked can be the first in line again
+            if other is not arc and not fits(arc, beside) and self._table.usable(other):
                 reserved = self._reserved_at((other, LOOK_AHEAD), chain, now_s)
                 if reserved.start_s < end_s:
                     return reserved
