@@ -46,7 +46,7 @@ async def changes(bus: LifeBus, number: int, within_s: float = NOTICED_WITHIN_S)
         pass
     finally:
         watching.close()
-    return seen
+    return seen[:number]
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -58,7 +58,9 @@ async def test_a_link_without_messages_is_replaced_until_messages_pass(shared: b
     try:
         assert await changes(bus, 4) == [True, False, True, False]
         token = hub.liveliness().declare_token(KEY_OF_HUB)
-        assert (await changes(bus, 9, within_s=1.0))[-1]
+        async with asyncio.timeout(NOTICED_WITHIN_S):
+            while (await changes(bus, 9, within_s=1.0))[-1:] != [True]:
+                pass  # the link of that moment may still be replaced
         assert await changes(bus, 2, within_s=0.5) == [True]
         token.undeclare()  # type: ignore[no-untyped-call]
     finally:
