@@ -8,7 +8,6 @@ from pathlib import Path
 import typer
 
 from backbone.command_line.options import CommandTable, SecretFile, Version, chosen, run, run_table
-from backbone.command_line.standard_streams import can_redraw
 from backbone.command_line.where import Where
 from ui_console import options as words
 from ui_console.model.profile import Profile, Sight
@@ -220,8 +219,8 @@ def _usage(complaint: str) -> typer.BadParameter:
 
 
 def _need_a_terminal(command: str, instead: str) -> None:
-    if not (sys.stdin.isatty() and can_redraw()):
-        raise _usage(f"{command} needs a terminal that can place text; without one use {instead}")
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise _usage(f"{command} needs a terminal; without one use {instead}")
 
 
 def _user() -> str:

@@ -117,7 +117,7 @@ def test_from_attach_to_release_key_by_key(mission: RunningMission, tmp_path: Pa
         assert holder(mission, "scout3").startswith("console-")
         screen.press("a", "a", "a")
         screen.press("y")
-        screen.shows(r"why scout1\?")
+        screen.shows(r"why scout3\?")
         screen.press("q")
         screen.press("Tab", "Tab", "Tab", "Tab", "Tab")
         screen.shows(r"commands to scout3")
