@@ -125,6 +125,8 @@ class ArcEntry:
         raised: Levels by which it rose because it waited long (aging).
         swapped_out: Reason of its last loss of its RCs; empty: it never lost them.
         swapped_out_by: ARC or RC that caused this.
+        made_way: How often in a row it was revoked, before its slice was over, for the same wait of a higher ARC.
+        made_way_for: That wait: name and stamp of the higher ARC.
     """
 
     name: str
@@ -166,6 +168,8 @@ class ArcEntry:
     raised: int = 0
     swapped_out: str = ""
     swapped_out_by: str = ""
+    made_way: int = 0
+    made_way_for: tuple[str, tuple[float, int]] = ("", (0.0, 0))
 
     def goes_before(self, other: ArcEntry) -> bool:
         """Return whether its owner is strictly higher than the other's."""

@@ -134,7 +134,7 @@ class FirstInLine:
             now_s: Time of its start.
         """
         self._look(now_s)
-        if self._still_delays(arc):
+        if self._makes_way(arc) or self._still_delays(arc):
             return True
         at = {rc: self.at(rc) for rc in arc.uses}
         chain = _Chain((arc,), self._ahead(arc, at))
@@ -159,6 +159,24 @@ class FirstInLine:
             self._service_version = state.service_version
             self._reserved.clear()
             self._delayed.clear()
+
+    def _makes_way(self, arc: ArcEntry) -> bool:
+        """Return whether the ARC was revoked twice for one that still waits for these RCs, and lets it go first now.
+
+        A start can change the estimates, so that it is revoked again: without this, again and again.
+        """
+        if arc.made_way < 2:
+            return False
+        other = self._state.arcs.get(arc.made_way_for[0])
+        return (
+            other is not None
+            and other.reservation is not None
+            and other.stamp == arc.made_way_for[1]
+            and other.goes_before(arc)
+            and not self._table.fits(arc, [other])
+            and self._table.usable(other)
+            and self._around_of(other).end_s < math.inf  # else a higher holder keeps it from starting
+        )
 
     def _still_delays(self, arc: ArcEntry) -> bool:
         """Return whether the earlier answer stands: what a start would delay has only come nearer. False: unknown."""

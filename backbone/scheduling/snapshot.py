@@ -44,7 +44,7 @@ from backbone.scheduling.trace_writer import TraceWriter
 from backbone.scheduling.transitions import Transitions
 from backbone.scheduling.whole_group import WholeGroupPlanner
 
-FORM = 6
+FORM = 7
 """Grows when snapshots of an earlier release can no longer be read."""
 _OBJECTS: dict[str, type[Any]] = {
     kind.__name__: kind

@@ -173,9 +173,18 @@ class Transitions:
         if arc.served(self._decision.now_s):
             arc.stamp = self.stamp()
         arc.swapped_out, arc.swapped_out_by = why, by
+        self._count_way(arc)
         arc.afterwards = afterwards
         self.enter(arc, RequestState.REVOKING)
         self.trace.record("revoke", cause, arc=arc.name, why=why, **({"by": by} if by else {}))
+
+    def _count_way(self, arc: ArcEntry) -> None:
+        """Count how often the ARC was revoked before its slice was over for the same wait of a higher one."""
+        if arc.served(self._decision.now_s):
+            arc.made_way = 0
+        elif arc.swapped_out == "higher":
+            wait = arc.swapped_out_by, self._state.arcs[arc.swapped_out_by].stamp
+            arc.made_way, arc.made_way_for = 1 + arc.made_way * (arc.made_way_for == wait), wait
 
     def free(self, arc: ArcEntry, state: RequestState) -> None:
         """Queue or idle an ARC when its RCs are in their safe states."""

@@ -242,6 +242,12 @@ FAULTS = [
         "if True:",
     ),
     Planted(
+        "an ARC makes way again and again",
+        "first_in_line.py",
+        "if arc.made_way < 2:",
+        "if True:",
+    ),
+    Planted(
         "an ARC of a large group counts as blocked although its blocker has changed",
         "large_group.py",
         "and known.version == state.rc_versions.get(known.rc, 0) + state.service_version",

@@ -71,6 +71,7 @@ def fleet(seed: int, rules: dict[str, Any]) -> Bench:
 @example(played=crowd, seed=167, rules={})  # differs if a reservation depends on earlier questions
 @example(played=crowd, seed=294, rules={})
 @example(played=crowd, seed=11, rules={"policy": "strict"})  # differs if a reservation stands after its time
+@example(played=fleet, seed=27, rules={"aging_s": 3.0})  # stands still if an ARC makes way again and again
 @example(played=fleet, seed=332460, rules={})  # differs if a holder that is first in line again counts twice
 def test_a_planner_that_keeps_nothing_decides_the_same(
     played: Callable[[int, dict[str, Any]], Bench], seed: int, rules: dict[str, Any]
