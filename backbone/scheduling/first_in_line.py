@@ -125,6 +125,17 @@ class FirstInLine:
             known = self._firsts[rc] = version, self._table.first_in_order(queued) if queued else None
         return known[1]
 
+    def is_first_without(self, rc: str, joined: Sequence[ArcEntry]) -> bool:
+        """Return whether the first ARC at the RC would be the first without these, too; False also if it is unknown.
+
+        Under the discipline ``time`` it is unknown: there the question itself fixes the order.
+        """
+        first = None if self._by_time else self.at(rc)
+        if first is None or first in joined:
+            return False
+        others = [user for user in self._state.users[rc] if user.queued and user not in joined]
+        return self._table.first_in_order([user for user in others if self._table.usable(user)]) is first
+
     def takes_from_others(self, arc: ArcEntry, holders: Sequence[ArcEntry], now_s: float) -> bool:
         """Return whether a start now would take time from a higher ARC or from the first in line at an RC.
 

@@ -53,13 +53,13 @@ class LargeGroupPlanner:
         self._state = table.state
         self._firsts = FirstInLine(table, slack_s=slack_s)
         self._by_time = table.state.fairness.discipline == "time"
-        self._near: dict[str, None] = {}
+        self._near: dict[str, Sequence[ArcEntry]] = {}
         self._candidates: dict[ArcEntry, None] = {}
         self._blocked: dict[ArcEntry, _Blocked] = {}
 
-    def look_near(self, rc: str) -> None:
+    def look_near(self, rc: str, joined: Sequence[ArcEntry]) -> None:
         """Examine, in the next decision, the ARCs that a change of this RC concerns."""
-        self._near[rc] = None
+        self._near[rc] = joined
 
     def due(self, now_s: float) -> Turn | None:
         """Return a turn whose time is now, of the most senior candidate; after None there are no candidates."""
@@ -122,7 +122,10 @@ class LargeGroupPlanner:
         users, bits, held_alone = self._state.users, self._state.bits, self._state.held_alone
         firsts: dict[str, ArcEntry | None] = {}
         elsewhere: dict[str, None] = {}
-        for rc in self._near:
+        for rc, joined in self._near.items():
+            if joined and self._firsts.is_first_without(rc, joined):
+                self._candidates.update(dict.fromkeys(joined))  # no other may start because these wait, too
+                continue
             for arc in users.get(rc, ()):
                 if arc.state is RequestState.WAITING:
                     self._candidates[arc] = None

@@ -13,7 +13,7 @@ from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.large_group import LargeGroupPlanner
 from backbone.scheduling.own_planner import PlannerType
 from backbone.scheduling.planner import Planner, Slot, Turn
-from backbone.scheduling.state import ScheduleState
+from backbone.scheduling.state import ScheduleState, all_joined
 from backbone.scheduling.table import Table
 from backbone.scheduling.whole_group import WholeGroupPlanner
 
@@ -53,7 +53,7 @@ class MasterSchedule:
         self._large: Planner = LargeGroupPlanner(self.table, slack_s=tolerance_s)
         if planner is not None:
             self._small = self._large = planner(self.table, slack_s=tolerance_s)
-        self._changed_in_large: dict[str, None] = {}
+        self._changed_in_large: dict[str, Sequence[ArcEntry]] = {}
         self._exact_up_to = exact_up_to
         whole_up_to = math.inf if self._large.is_exact else exact_up_to
         self.planned_whole_up_to: float = whole_up_to if self._small.is_exact else 0
@@ -70,25 +70,25 @@ class MasterSchedule:
         self._look_where_it_changed()
         turn = self._small.due(now_s)
         if turn is None:
-            for rc in self._changed_in_large:
-                self._large.look_near(rc)
+            for rc, joined in self._changed_in_large.items():
+                self._large.look_near(rc, joined)
             self._changed_in_large.clear()
             turn = self._large.due(now_s)
         return turn
 
     def _look_where_it_changed(self) -> None:
-        changed = [rc for rc in self.state.changed if self.state.users.get(rc)]
+        changed = {rc: joined for rc, joined in self.state.changed.items() if self.state.users.get(rc)}
         self.state.changed.clear()
-        planners = [self.planner_of(next(iter(self.state.users[rc]))) for rc in changed]
-        for rc, planner in zip(changed, planners, strict=True):
+        planners = {rc: self.planner_of(next(iter(self.state.users[rc]))) for rc in changed}
+        for rc, planner in planners.items():
             if planner is self._small:
-                planner.look_near(rc)
+                planner.look_near(rc, changed[rc])
             else:
-                self._changed_in_large[rc] = None
+                self._changed_in_large[rc] = all_joined(self._changed_in_large.get(rc), changed[rc])
         if (
-            self.table.strict and not self._large.is_exact and self._large in planners
+            self.table.strict and not self._large.is_exact and self._large in planners.values()
         ):  # before the change any ARC of a large group may have been held back
-            self._changed_in_large.update(dict.fromkeys(self.state.rcs))
+            self._changed_in_large.update(dict.fromkeys(self.state.rcs, ()))
 
     def forgotten(self, now_s: float) -> ArcEntry | None:
         """Return an ARC whose time is now although no turn was found for it; for checks."""

@@ -68,8 +68,12 @@ class Planner(Protocol):
     def reserves(self) -> bool:
         """Whether a later start binds equals, too."""
 
-    def look_near(self, rc: str) -> None:
-        """Examine, in the next decision, the ARCs that a change of this RC concerns."""
+    def look_near(self, rc: str, joined: Sequence[ArcEntry]) -> None:
+        """Examine, in the next decision, the ARCs that a change of this RC concerns.
+
+        Args:
+            joined: The ARCs that began to wait there, if nothing else changed; else empty.
+        """
 
     def due(self, now_s: float) -> Turn | None:
         """Return an ARC whose time is now and the holders to revoke for it; None if it finds none.

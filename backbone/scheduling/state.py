@@ -35,7 +35,8 @@ class ScheduleState:
         version: Grows with every change.
         service_version: Grows with every change of the RCs' service or of priorities.
         rc_versions: RC → a number that grows with every other change that concerns the RC.
-        changed: RCs that changes concerned since the last examination by the planners, in the order of the changes.
+        changed: RCs that changes concerned since the planners last examined them, in the order of the changes, with
+            the ARCs that began to wait there if nothing else changed, else with none.
         concerned: The RCs that changes concerned since the last examination of the reservations, as a set of bits.
         bits: RC → its bit in sets of RCs.
         held_alone: RCs held exclusively by an ARC whose slice is not over, as a set of bits.
@@ -63,7 +64,7 @@ class ScheduleState:
         self.version = 0
         self.service_version = 0
         self.rc_versions: dict[str, int] = {}
-        self.changed: dict[str, None] = {}
+        self.changed: dict[str, Sequence[ArcEntry]] = {}
         self.concerned = 0
         self.bits: dict[str, int] = {}
         self._epochs_of_removed: dict[str, int] = {}
@@ -72,10 +73,14 @@ class ScheduleState:
 
     # Changes.
 
-    def concerns(self, rcs: Iterable[str]) -> None:
-        """Record that a change concerns these RCs."""
+    def concerns(self, rcs: Iterable[str], *, joined: Sequence[ArcEntry] = ()) -> None:
+        """Record that a change concerns these RCs.
+
+        Args:
+            joined: The idle ARC that began to wait, if that is the change.
+        """
         for rc in rcs:
-            self.changed[rc] = None
+            self.changed[rc] = all_joined(self.changed.get(rc), joined)
             self.concerned |= self.bits.get(rc, 0)
             self.rc_versions[rc] = self.rc_versions.get(rc, 0) + 1
         self.version += 1
@@ -233,7 +238,7 @@ class ScheduleState:
         arc.queued = state is RequestState.WAITING or (
             state is RequestState.REVOKING and arc.afterwards is Afterwards.WAIT
         )
-        self.concerns(arc.uses)
+        self.concerns(arc.uses, joined=() if was_active or not arc.queued else [arc])
         if held != arc.holds:
             for rc in arc.uses:
                 if held:
@@ -307,3 +312,15 @@ class ScheduleState:
         self._levels = {place: level for place, level in self._levels.items() if level in present}
         for level in present:
             level.ranks = {other: known for other, known in level.ranks.items() if other in present}
+
+
+def all_joined(before: Sequence[ArcEntry] | None, joined: Sequence[ArcEntry]) -> Sequence[ArcEntry]:
+    """Return the ARCs that began to wait at an RC in two changes; none if one of them was another change.
+
+    Args:
+        before: Those of the first change; None: there was none.
+        joined: Those of the second.
+    """
+    if before is None:
+        return joined
+    return [*before, *joined] if before and joined else ()

@@ -50,8 +50,9 @@ class WholeGroupPlanner:
         self._plans: dict[Group[ArcEntry], GroupPlans] = {}
         self._planned = -1
 
-    def look_near(self, rc: str) -> None:
+    def look_near(self, rc: str, joined: Sequence[ArcEntry]) -> None:
         """Examine, in the next decision, the group that uses the RC."""
+        del joined
         self._near[rc] = None
 
     def due(self, now_s: float) -> Turn | None:

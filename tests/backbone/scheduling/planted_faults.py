@@ -248,6 +248,12 @@ FAULTS = [
         "if True:",
     ),
     Planted(
+        "a new first in line concerns no other",
+        "large_group.py",
+        "if joined and self._firsts.is_first_without(rc, joined):",
+        "if joined:",
+    ),
+    Planted(
         "an ARC of a large group counts as blocked although its blocker has changed",
         "large_group.py",
         "and known.version == state.rc_versions.get(known.rc, 0) + state.service_version",

@@ -11,7 +11,7 @@ from examples import share
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from random_missions import crowded_mission, fleet_mission, play
-from simulated_switches import MISSION, Bench, ask, manager, sharable, states
+from simulated_switches import MISSION, Bench, ask, manager, sharable, states, unit
 
 from backbone.scheduling import large_group, master_schedule, state
 from backbone.scheduling.compatibility import Compatibility
@@ -95,6 +95,40 @@ def test_answers_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(5):
         fleet(seed, {})
     assert answers.count(True) > 100
+
+
+def test_a_request_that_is_first_in_no_line_examines_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    examined: list[set[str]] = []
+
+    class Recording(LargeGroupPlanner):
+        def _examine(self) -> None:
+            super()._examine()
+            examined.append({arc.name for arc in self._candidates})
+
+    monkeypatch.setattr(master_schedule, "LargeGroupPlanner", Recording)
+    bench = Bench(manager(exact_up_to=0), unit("camera"))
+    for arc in ["runs", "first", "next"]:
+        bench.tell(ask(arc, {"camera": RcUse()}))
+    examined.clear()
+    bench.tell(ask("last", {"camera": RcUse()}))
+    assert set().union(*examined) == {"last"}
+
+
+def test_a_new_first_in_line_lets_those_start_that_waited_for_the_former_one() -> None:
+    bench = Bench(manager(exact_up_to=0), unit("robot"), unit("camera"))
+
+    def asks(arc: str, *rcs: str, team: str = "", priority: int = 1) -> None:
+        within = [(MISSION, 0), *([(team, 1)] if team else []), (arc, priority)]
+        bench.tell(ask(arc, {rc: RcUse() for rc in rcs}, run_s=5.0, path=within))
+        bench.run(bench.now_s + 1.0)
+
+    asks("runs", "robot")  # the equal of all others, for it is in no team
+    asks("first", "robot", "camera", team="team")
+    asks("beside", "camera")
+    assert states(bench)["beside"] is RequestState.WAITING
+    asks("higher", "robot", team="team", priority=2)
+    assert states(bench)["beside"] is RequestState.RUNNING
+    assert bench.verdict() == []
 
 
 def test_a_pair_of_a_known_kind_with_other_priorities_is_another_pair() -> None:
