@@ -175,26 +175,33 @@ async def _mission_file(bus: Bus) -> str:
         return ""
 
 
-async def _begun(bus: Bus, clock: MissionClock) -> datetime:
-    """Return the time of day of mission time 0; if possible by the nameserver's clock, the same for all recorders."""
+async def _mission_time(bus: Bus) -> MissionTime:
+    """Return the nameserver's time, whose clocks are the same for all recorders; if it is silent, none is known."""
     try:
-        told = await bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)
+        return await bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)
     except (LinkError, Refusal):
-        told = MissionTime(0.0, 1.0)
+        return MissionTime(0.0, 1.0)
+
+
+def _begun(told: MissionTime, clock: MissionClock) -> datetime:
+    """Return the time of day of mission time 0, by the present clock of the nameserver's machine if it is known."""
     if told.unix_s:
         return datetime.fromtimestamp(told.unix_s - told.at_s / told.rate).astimezone()
     return datetime.now().astimezone() - timedelta(seconds=clock.now_s() / clock.rate)
 
 
 async def _about(bus: Bus, clock: MissionClock, keys: list[str]) -> dict[str, str]:
+    told = await _mission_time(bus)
     facts = {
         "mission": bus.mission,
-        "begun": (await _begun(bus, clock)).isoformat(timespec="milliseconds"),
+        "begun": _begun(told, clock).isoformat(timespec="milliseconds"),
         "clock_rate": f"{clock.rate:g}",
         "recorded_on": socket.gethostname(),
         "recorded_keys": " ".join(keys) or "all",
         "python": sys.version.partition(" ")[0],
     }
+    if told.clock_origin_monotonic_s:
+        facts["start"] = repr(told.clock_origin_monotonic_s)
     for package in VERSIONS_OF:
         with suppress(PackageNotFoundError):
             facts[package] = version(package)

@@ -102,7 +102,8 @@ class CommonAnswers:
             case AskState():
                 return component.answered_state()
             case AskTime():
-                return MissionTime(component.clock.now_s(), component.clock.rate, time.time())
+                clock, origin_s = component.clock, component.launch.clock_origin_monotonic_s
+                return MissionTime(clock.now_s(), clock.rate, time.time(), origin_s)
             case AskStatistics():
                 return self._statistics()
             case AskParameters():

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from backbone.component.log_level import LogLevel as LogLevel  # noqa: PLC0414  a part of these messages
 from backbone.errors import Refusal
-from backbone.ranges import FEW, MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
+from backbone.ranges import FEW, MANY, Address, Count, Instant, MachineTime, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
 MESSAGES_DROPPED, DEADLINES_MISSED = "dropped ", "deadlines missed "
@@ -149,11 +149,14 @@ class MissionTime(Message, frozen=True):
     Attributes:
         at_s: Mission time of the answer.
         unix_s: Time of day then on the answerer's machine, seconds since 1970; 0: not known.
+        clock_origin_monotonic_s: Its machine's monotonic clock at mission time 0, different for each start of a
+            mission; 0: not known.
     """
 
     at_s: Instant
     rate: Rate
     unix_s: Instant = 0.0
+    clock_origin_monotonic_s: MachineTime = 0.0
 
 
 PROCESSOR_S = "processor_s"

@@ -26,7 +26,7 @@ from backbone.recording.clock_offsets import ClockObserver, ClockOffsets
 from backbone.recording.reader import NoRecording, Recorded, Recording
 from backbone.recording.writer import MOST_CHANNELS, NS, begun_writer
 
-SAME_BEGIN_S = 2.0  # chosen: time services move a clock by less; no mission ends and begins again so soon
+SAME_BEGIN_S = 2.0  # chosen: no mission ends and begins again so soon; only for recordings without the fact ``start``
 
 Placed = tuple[int, Schema | None, Channel, Message, Recorded]
 """Corrected ``log_time`` of a message, and its records."""
@@ -113,8 +113,11 @@ def _common_facts(facts: Sequence[dict[str, str]]) -> dict[str, str]:
     if len(missions) > 1:
         raise OtherMission(f"the recordings are of the missions {', '.join(map(repr, missions))}")
     begins = sorted(datetime.fromisoformat(one["begun"]) for one in facts if "begun" in one)
-    if begins and (begins[-1] - begins[0]).total_seconds() > SAME_BEGIN_S:
-        raise OtherMission(f"one recording's mission began at {begins[0]}, another's at {begins[-1]}")
+    is_apart = bool(begins) and (begins[-1] - begins[0]).total_seconds() > SAME_BEGIN_S
+    starts = {one.get("start", "") for one in facts}
+    if len(starts - {""}) > 1 or (is_apart and "" in starts):
+        different = ", ".join(dict.fromkeys(map(str, begins)))
+        raise OtherMission(f"the recordings are of different starts of mission {missions[0]}: {different}")
     names = dict.fromkeys(name for one in facts for name in one)
     common = {name: ", ".join(dict.fromkeys(one[name] for one in facts if name in one)) for name in names}
     if begins:

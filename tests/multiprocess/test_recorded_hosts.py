@@ -91,6 +91,12 @@ def test_each_host_records_all_that_its_components_say_and_nothing_else(night: N
         assert elsewhere, "there is something to compare"
 
 
+def test_recordings_of_all_hosts_name_the_same_start(night: Night) -> None:
+    with contextlib.ExitStack() as stack:
+        files = [stack.enter_context(path.open("rb")) for path in (*night.files.values(), night.joined)]
+        assert len({Recording(file).contents().about["start"] for file in files}) == 1
+
+
 def test_pictures_are_recorded_by_their_own_host(night: Night) -> None:
     assert {night.hosts[one.source] for one in night.of("base", PICTURES)} == {"base"}
 

@@ -124,16 +124,26 @@ def test_of_what_recorders_saw_of_presence_only_changes_stay() -> None:
 
 
 @pytest.mark.parametrize(
-    "about",
+    ("about", "other"),
     [
-        ABOUT | {"mission": "day"},
-        ABOUT | {"begun": "2026-05-04T10:00:05.000+00:00"},
-        ABOUT | {"begun": "2026-05-03T10:00:00.000+02:00"},
+        (ABOUT, ABOUT | {"mission": "day"}),
+        (ABOUT, ABOUT | {"begun": "2026-05-04T10:00:05.000+00:00"}),
+        (ABOUT, ABOUT | {"begun": "2026-05-03T10:00:00.000+02:00"}),
+        (ABOUT, ABOUT | {"begun": "2026-05-04T10:00:05.000+00:00", "start": "7.5"}),
+        (ABOUT | {"start": "7.5"}, ABOUT | {"start": "8.25"}),
     ],
 )
-def test_recordings_of_other_missions_or_starts_are_refused(about: dict[str, str]) -> None:
+def test_recordings_of_other_missions_or_starts_are_refused(about: dict[str, str], other: dict[str, str]) -> None:
     with pytest.raises(OtherMission):
-        joined(file_of([]), file_of([], about))
+        joined(file_of([], about), file_of([], other))
+
+
+@pytest.mark.parametrize("begun", ["2026-05-04T11:00:00.000+00:00", "1970-01-01T00:00:40.000+00:00"])
+def test_a_clock_that_was_set_during_the_mission_does_not_make_two_missions_of_it(begun: str) -> None:
+    about = [ABOUT | {"start": "7.5", "begun": one} for one in (BEGUN, begun)]
+    done, recording = joined(file_of([said(SCOUT, 1, 1.0)], about[0]), file_of([said(SCOUT, 2, 2.0)], about[1]))
+    assert done.messages == 2
+    assert recording.contents().about == about[0] | {"begun": min(BEGUN, begun)}
 
 
 def test_a_damaged_recording_is_refused() -> None:
