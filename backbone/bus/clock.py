@@ -46,6 +46,10 @@ class MissionClock:
         """Return the mission time in seconds."""
         return (time.monotonic() - self.origin_monotonic_s) * self.rate
 
+    def set_to(self, at_s: float) -> None:
+        """Show this mission time now. A wait that has begun stays as long as it is."""
+        self.origin_monotonic_s = time.monotonic() - at_s / self.rate
+
     async def sleep_s(self, duration_s: float) -> None:
         """Return after this many mission seconds; at least yields once."""
         await asyncio.sleep(max(0.0, duration_s) / self.rate)

@@ -183,7 +183,7 @@ async def _play_in(
         gc.collect()
         gc.freeze()  # collecting all imported objects takes tens of milliseconds (measured)
         gc.disable()  # and a collection of decoded messages takes milliseconds, at any time
-        clock.origin_monotonic_s = time.monotonic() + LEAD_S - since_s / wanted.speed
+        clock.set_to(since_s - LEAD_S * wanted.speed)
         run_files.write(
             run_files.RunFile(
                 mission=name,
