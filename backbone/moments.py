@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 from backbone.errors import Refusal
 
@@ -12,7 +12,8 @@ _AGO = re.compile(r"(\d+(?:\.\d+)?)(s|m|h|d)")
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3_600.0, "d": 86_400.0}
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}))?")
 _MISSION_TIME = re.compile(r"\d+(?:\.\d+)?")
-FIRST_DAY, LAST_DAY = datetime.min + timedelta(days=2), datetime.max - timedelta(days=2)
+FIRST_DAY = datetime.min.replace(tzinfo=UTC) + timedelta(days=2)
+LAST_DAY = datetime.max.replace(tzinfo=UTC) - timedelta(days=2)
 """Limits of a time of day, two days inside the range of dates: a conversion between time zones stays in the range."""
 
 
@@ -39,10 +40,10 @@ class Now:
     def time_of_day(self, at_s: float) -> datetime:
         """Return this machine's local time at a mission time, limited to ``FIRST_DAY`` and ``LAST_DAY``."""
         try:
-            shown = self.here - timedelta(seconds=(self.mission_s - at_s) / self.rate)
+            shown = self.here.astimezone(UTC) - timedelta(seconds=(self.mission_s - at_s) / self.rate)
         except OverflowError:
-            return FIRST_DAY if at_s < self.mission_s else LAST_DAY
-        return min(max(shown, FIRST_DAY), LAST_DAY)
+            shown = FIRST_DAY if at_s < self.mission_s else LAST_DAY
+        return min(max(shown, FIRST_DAY), LAST_DAY).astimezone().replace(tzinfo=None)
 
 
 def moment(text: str, now: Now) -> float:
@@ -65,5 +66,5 @@ def moment(text: str, now: Now) -> float:
         if hour < 24 and minute < 60 and second < 60:
             then = now.here.replace(hour=hour, minute=minute, second=second, microsecond=0)
             then -= timedelta(days=1) if then > now.here else timedelta(0)  # the last moment with this time of day
-            return now.mission_s - (now.here - then).total_seconds() * now.rate
+            return now.mission_s - (now.here.timestamp() - then.timestamp()) * now.rate
     raise NoMoment(f"{text!r} is no moment", text=text)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
 from datetime import datetime
 
 import pytest
@@ -44,3 +46,20 @@ def test_anything_else_is_refused_but_a_plain_number_is_mission_time(typed: str)
 def test_the_time_of_day_of_a_mission_time_leads_back_to_it(at_s: float) -> None:
     shown = NOW.time_of_day(at_s)
     assert NOW.mission_s - (NOW.here - shown).total_seconds() * NOW.rate == pytest.approx(at_s, abs=1e-3)
+
+
+@pytest.fixture
+def in_berlin(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let local times be those of central Europe, whose clocks go from 2:00 to 3:00 on 29 March 2026."""
+    with monkeypatch.context() as patch:
+        patch.setenv("TZ", "CET-1CEST,M3.5.0,M10.5.0/3")
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.usefixtures("in_berlin")
+def test_an_hour_that_the_clocks_leave_out_is_no_time_of_the_mission() -> None:
+    now = Now(3600.0, datetime(2026, 3, 29, 3, 30))
+    assert now.time_of_day(0.0) == datetime(2026, 3, 29, 1, 30)
+    assert moment("01:45", now) == 900.0
