@@ -47,11 +47,13 @@ def _how_far(offset: Offset) -> str:
     Example:
         >>> _how_far(Offset(1.5, 2.5, 2.0)), _how_far(Offset(-2.5, -1.5, -2.0)), _how_far(Offset(-math.inf, -1.0, -1.0))
         ('1.5000 to 2.5000 s ahead of', '1.5000 to 2.5000 s behind', 'at least 1.0000 s behind')
+        >>> _how_far(Offset(-math.inf, math.inf, 0.002)), _how_far(Offset(-0.5, 0.5, 0.0, moved_s=1.0))
+        ('about 0.0020 s ahead of', 'right on average with')
     """
     least_s, most_s = offset.at_least_s, offset.at_most_s
-    if least_s <= 0 <= most_s:
-        return "right on average with"
     side = "ahead of" if offset.taken_s > 0 else "behind"
+    if least_s <= 0 <= most_s:  # other clocks that causes bind to this one leave no room for 0
+        return f"about {abs(offset.taken_s):.4f} s {side}" if offset.taken_s else "right on average with"
     nearest_s, farthest_s = sorted((abs(least_s), abs(most_s)))
     if math.isinf(farthest_s):
         return f"at least {nearest_s:.4f} s {side}"
