@@ -68,8 +68,10 @@ class KeyFacts:
             self.declared[f"{address}/{key}/{Conversation.OUTPUTS}"] = qualities[key]
 
     def quality_of(self, key: str) -> Quality | None:
-        """Return the quality of a key; None: it has no known conversation."""
-        conversation = key.rpartition("/")[2]
+        """Return the quality of a key; None: no known conversation, or an output of a unit that did not answer."""
+        address, conversation = "/".join(key.split("/")[:2]), key.rpartition("/")[2]
+        if conversation == Conversation.OUTPUTS and address in self.silent:
+            return None
         known = QUALITY[Conversation(conversation)] if conversation in set(Conversation) else None
         return self.declared.get(key, known)
 

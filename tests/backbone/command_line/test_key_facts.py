@@ -47,6 +47,14 @@ def test_a_row_says_the_quality_that_a_unit_declared() -> None:
     assert list(told.values()) == ["reliable, urgent", str(OutputQuality().quality), ""]
 
 
+def test_a_row_says_no_quality_if_the_unit_that_may_declare_another_is_silent() -> None:
+    facts, table = KeyFacts(silent=["m/vision", "x/a"]), TrafficTable()
+    for key in ("m/vision/ball/outputs", "x/a/frames"):
+        table.add(f"scout/night/{key}", "m/vision", "Note/1", 10)
+    told = {row["key"]: facts_text(row) for row in with_facts(table.busiest(1.0), facts, "night")}
+    assert list(told.values()) == ["", "best effort, low"]
+
+
 @pytest.mark.parametrize("nonsense", [{"published": 3}, {"published": ["a"], "qualities": {"a": {"reliable": 2}}}, {}])
 def test_a_unit_of_another_release_changes_nothing(nonsense: dict[str, object]) -> None:
     facts = KeyFacts()
