@@ -170,9 +170,9 @@ def print_version(is_asked: bool) -> None:
 
 
 ENDPOINT = re.compile(
-    r"((tcp|tls|quic|udp|ws)/(?P<host>[^\s/?#]+):(?P<port>[0-9]{1,5})|unixsock-stream/[^\s?#]+)(\?[^\s?#]+)?(#[^\s?]+)?"
+    r"((tcp|tls)/(?P<host>[^\s/?#]+):(?P<port>[0-9]{1,5})|unixsock-stream/[^\s?#]+)(\?[^\s?#]+)?(#[^\s?]+)?"
 )
-"""The form that Zenoh reads, with metadata and configuration at its end."""
+"""The form that Zenoh reads, with metadata and configuration at its end. No hub listens by another protocol."""
 
 
 def hub_endpoint(value: str | None) -> str | None:

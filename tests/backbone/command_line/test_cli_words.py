@@ -50,6 +50,7 @@ def test_help_tells_every_command_whole(command_line: Any) -> None:
         *("tcp/host:1?", "tcp/host:1#", "tcp/host:1#a=b?c=d", "tcp/#:1", "unixsock-stream//run/m#a?b"),
         *("tcp/192.0.2..7:7447", "tcp/lab..local:7447", "tcp/192.0.2.300:7447", "tcp/[::g]:7447"),
         *("tcp/192.0.2.7:0", "tcp/192.0.2.7:65536"),
+        *("udp/192.0.2.7:7447", "quic/192.0.2.7:7447", "ws/192.0.2.7:7447"),
     ],
 )
 def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(command_line: Any, wrong: str) -> None:
