@@ -20,6 +20,7 @@ from enum import IntEnum
 
 from backbone.bus.answers import AnsweredByMessage, Came, NoInbox
 from backbone.bus.declared import Withdrawal
+from backbone.bus.inbox import Whole
 from backbone.operating_system import local_sockets
 from backbone.waiting import settle
 from backbone.wire import MAX_MESSAGE_BYTES
@@ -189,19 +190,11 @@ class HostQuestion(AnsweredByMessage):
     """A question that came on a line, with what its answer needs."""
 
     def __init__(self, line: HostLine, number: int, payload: bytes) -> None:
-        self._line, self._number, self.payload = line, number, _Whole(payload)
+        self._line, self._number, self.payload = line, number, Whole(payload)
 
     def send(self, payload: bytes, *, is_answer: bool) -> None:
         """Send a message on the line."""
         self._line.send(self._number, Kind.ANSWER if is_answer else Kind.NO_ANSWER, payload)
-
-
-class _Whole(bytes):
-    """Bytes with the interface of a payload."""
-
-    def to_bytes(self) -> bytes:
-        """Return itself."""
-        return self
 
 
 @dataclass(slots=True)

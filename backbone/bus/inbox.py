@@ -22,6 +22,7 @@ T = TypeVar("T")
 
 MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: for one listener; seconds of the traffic of a busy component
 AT_ONCE_S = 0.01  # chosen: a timer is at most so late by a flood of messages; an honest burst takes less
+BATCH_BYTES = 64 * 1024  # zenoh 1.10: a message keeps in memory the whole batch in which it came
 GATHER_S = 0.05  # chosen: a component that overhears a mission is woken at most twenty times a second
 
 
@@ -48,6 +49,18 @@ class Sample(Protocol):
     @property
     def attachment(self) -> Payload | None:
         """Bytes that travel with it."""
+
+
+class Whole(bytes):
+    """Bytes with the interface of a payload."""
+
+    def to_bytes(self) -> bytes:
+        """Return itself."""
+        return self
+
+
+Arrival = tuple[str, Payload]
+"""Key and payload of a publication that waits for the event loop."""
 
 
 class InboxBus(BusBase):
@@ -150,7 +163,7 @@ class _InOrder(ABC):
         push: Makes the event loop call a function with an arrival.
     """
 
-    def __init__(self, push: Callable[[Callable[[Sample], None], Sample], None], most_waiting_bytes: int) -> None:
+    def __init__(self, push: Callable[[Callable[[Arrival], None], Arrival], None], most_waiting_bytes: int) -> None:
         self._push, self._waiting = push, _Waiting(most_waiting_bytes)
 
     @property
@@ -159,13 +172,16 @@ class _InOrder(ABC):
         return self._waiting.dropped
 
     def __call__(self, sample: Sample) -> None:
-        """Take a sample in; called from any thread."""
-        if self._waiting.admits(len(sample.payload)):
-            self._push(self._hand_over_one, sample)
+        """Take a sample in; called from any thread. What waits of a short one is a copy, without its batch."""
+        payload = sample.payload
+        if self._waiting.admits(len(payload)):
+            waits = Whole(payload.to_bytes()) if len(payload) < BATCH_BYTES else payload
+            self._push(self._hand_over_one, (str(sample.key_expr), waits))
 
-    def _hand_over_one(self, sample: Sample) -> None:
-        self._waiting.ends(len(sample.payload))
-        self.hand_over(str(sample.key_expr), sample.payload)
+    def _hand_over_one(self, arrival: Arrival) -> None:
+        key, payload = arrival
+        self._waiting.ends(len(payload))
+        self.hand_over(key, payload)
 
     @abstractmethod
     def hand_over(self, key: str, payload: Payload) -> None:
