@@ -1,4 +1,4 @@
-"""Links of a session to the hub over TCP: their close never blocks, and one without messages is replaced.
+"""Links of a session over TCP: they have our options, and a client's link without messages is replaced.
 
 After a cut, a new address, or a loss of many packets, a new connection of zenoh 1.10 may be *deaf*: it stays up and
 keeps itself alive, but passes no message to the client for ever. The hub declares a token, which a client finds over
@@ -15,7 +15,7 @@ from contextlib import suppress
 
 import zenoh
 
-from backbone.bus.sockets import close_without_waiting, shut_down
+from backbone.bus.sockets import set_options, shut_down
 from backbone.keys import KEY_OF_HUB
 
 log = logging.getLogger(__name__)
@@ -52,7 +52,7 @@ class Links:
             return
         is_up = event.kind == zenoh.SampleKind.PUT
         if is_up:
-            close_without_waiting()
+            set_options()
         self._call_soon(self._look_later if is_up else self._forget, int(local.rpartition(":")[2]))
 
     def _call_soon(self, act: Callable[..., None], *arguments: object) -> None:

@@ -24,7 +24,7 @@ SIGNALS = _words(
     """SIGALRM SIGCHLD SIGCONT SIGHUP SIGKILL SIGPIPE SIGQUIT SIGSTOP SIGTSTP SIGUSR1 SIGUSR2 SIGWINCH alarm pause
     pthread_kill pthread_sigmask setitimer sigwait sigtimedwait"""
 )
-SOCKETS = _words("""AF_UNIX SO_LINGER SO_PEERCRED SO_REUSEPORT SCM_RIGHTS send_fds recv_fds""")
+SOCKETS = _words("""AF_UNIX SO_LINGER SO_PEERCRED SO_REUSEPORT TCP_NOTSENT_LOWAT SCM_RIGHTS send_fds recv_fds""")
 METHODS = _words(
     """add_reader add_signal_handler add_writer create_unix_connection create_unix_server open_unix_connection
     start_unix_server"""

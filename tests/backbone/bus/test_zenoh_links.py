@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
 
 import pytest
 import zenoh
@@ -13,6 +15,7 @@ from free_ports import free_endpoint
 from backbone.bus import zenoh_links
 from backbone.bus.clock import MissionClock
 from backbone.bus.shared_bus import SharedSession
+from backbone.bus.sockets import MOST_UNSENT_BYTES
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.bus.zenoh_life import LifeBus
 from backbone.keys import KEY_OF_HUB
@@ -114,6 +117,31 @@ async def test_a_link_that_only_keeps_itself_alive_is_replaced() -> None:
         finally:
             await bus.close()
     await hub.close()
+
+
+def unsent_limits(port: int) -> list[int]:
+    """Return how many unsent bytes the system keeps at most, for each end of the connections to a port."""
+    limits = []
+    for entry in Path("/proc/self/fd").iterdir():
+        with suppress(OSError), socket.fromfd(int(entry.name), socket.AF_INET, socket.SOCK_STREAM) as one:
+            if (port,) in (one.getsockname()[1:], one.getpeername()[1:]):
+                limits.append(one.getsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT))
+    return limits
+
+
+async def test_of_a_link_the_system_keeps_few_bytes_that_no_urgent_message_overtakes() -> None:
+    endpoint, clock = free_endpoint(), MissionClock.started_now()
+    hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
+    bus = ZenohBus.open(MISSION, CLIENT, clock, client_config(endpoint))
+    try:
+        assert await changes(bus, 1) == [True]
+        both, port = [MOST_UNSENT_BYTES] * 2, int(endpoint.rpartition(":")[2])  # of the client and of the hub
+        async with asyncio.timeout(NOTICED_WITHIN_S):
+            while unsent_limits(port) != both:
+                await changes(bus, 2, within_s=0.1)
+    finally:
+        await bus.close()
+        await hub.close()
 
 
 async def test_a_link_to_a_hub_stays() -> None:
