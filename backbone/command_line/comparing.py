@@ -12,7 +12,15 @@ from backbone.command_line.unusable_file import FileUnusable, unreadable
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.recording.comparison import Difference, KeyComparison, Named, compared, pairs_in
-from backbone.recording.detection import DetectionRates, Mark, detected, read_marks, sightings, worse
+from backbone.recording.detection import (
+    DetectionRates,
+    Mark,
+    detected,
+    read_marks,
+    require_recorded,
+    sightings,
+    worse,
+)
 from backbone.spoken import counted
 
 LONGEST_VALUE = 60  # chosen: two of them fit a line of a wide terminal
@@ -63,6 +71,7 @@ def _marks(path: Path) -> list[Mark]:
 def _detection(path: Path, marks: Sequence[Mark]) -> DetectionRates:
     with opened(path) as recording:
         contents = recording.contents()
+        require_recorded(marks, str(path), contents.begin_s, contents.end_s)
         seen = sightings(recording.messages((f"*/{Conversation.EVENTS}",)))
     return detected(marks, seen, contents.end_s - contents.begin_s)
 

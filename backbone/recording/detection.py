@@ -31,6 +31,13 @@ class NoMarks(Refusal):
     remedy = 'Write a mark in each line, as {"from_s": 12, "to_s": 20, "what": "intruder", "robot": "scout1"}.'
 
 
+class MarkNotRecorded(Refusal):
+    """A mark is of a time that a recording does not have, so a watcher could not detect it there."""
+
+    code = "recording.mark"
+    remedy = "Name recordings that have the times of all marks, or remove the mark."
+
+
 class Mark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Something that was visible for a time.
 
@@ -124,6 +131,18 @@ def read_marks(text: str) -> list[Mark]:
     if not marks:
         raise NoMarks("the file has no mark")
     return marks
+
+
+def require_recorded(marks: Sequence[Mark], recording: str, begin_s: float, end_s: float) -> None:
+    """Return if the recording has a part of the time of each mark.
+
+    Raises:
+        MarkNotRecorded: It has no part of one.
+    """
+    for number, mark in enumerate(marks, start=1):
+        if mark.from_s > end_s or mark.to_s < begin_s:
+            lasts = f"mark {number} is from {mark.from_s:g} to {mark.to_s:g} s"
+            raise MarkNotRecorded(f"{lasts}, but {recording} has {begin_s:.3f} to {end_s:.3f} s", number=number)
 
 
 def sightings(messages: Iterable[Recorded]) -> list[WatcherReport]:

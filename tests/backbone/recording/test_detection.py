@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 
 from backbone.command_line.comparing import compare_detection
 from backbone.launcher.endings import ExitCode
-from backbone.recording.detection import SIGHTING, Mark, NoMarks, WatcherReport, detected, read_marks, worse
+from backbone.recording.detection import (
+    SIGHTING,
+    Mark,
+    MarkNotRecorded,
+    NoMarks,
+    WatcherReport,
+    detected,
+    read_marks,
+    worse,
+)
 from backbone.recording.detection import sightings as sightings_in
 from backbone.recording.known_messages import message_classes
 from backbone.recording.presence import Presence
@@ -145,6 +154,23 @@ async def test_the_command_says_which_recording_is_worse(tmp_path: Path, capsys:
     assert await compare_detection(paths[:1], marks_file, 0.0, as_json=True) == ExitCode.DONE
     [judged] = map(msgspec.json.decode, capsys.readouterr().out.splitlines())
     assert (judged["delays_s"], judged["missed"], judged["worse"]) == ([1.0, 1.0], 0, [])
+
+
+@pytest.mark.parametrize(("mark", "is_recorded"), [((50, 3600), True), ((61, 70), False), ((900, 920), False)])
+async def test_a_mark_that_a_recording_cannot_have_is_refused(
+    tmp_path: Path, mark: tuple[int, int], is_recorded: bool
+) -> None:
+    """It would count as missed, as if a watcher had been blind."""
+    marks_file, path = tmp_path / "marks.jsonl", tmp_path / "one.mcap"
+    marks = [Mark(10.0, 20.0), Mark(*map(float, mark))]
+    marks_file.write_bytes(msgspec.json.Encoder().encode_lines(marks))
+    record(path, [11.0])
+    if is_recorded:
+        assert await compare_detection([path], marks_file, 0.0, as_json=False) is ExitCode.DONE
+        return
+    told = rf"mark 2 is from {mark[0]} to {mark[1]} s, but .*one.mcap has 0.000 to 60.000 s"
+    with pytest.raises(MarkNotRecorded, match=told):
+        await compare_detection([path], marks_file, 0.0, as_json=False)
 
 
 def record(path: Path, seen_s: list[float]) -> None:
