@@ -30,14 +30,14 @@ class Said(NamedTuple):
     cause: str = ""
 
 
-def recorded(said: Iterable[Said]) -> io.BytesIO:
+def recorded(said: Iterable[Said], mission: str = MISSION) -> io.BytesIO:
     """Return the file of a recording; the messages of each sender are numbered in their order."""
     file, numbers = io.BytesIO(), dict[str, int]()
-    writer = RecordingWriter(file, CLASSES, {"mission": MISSION})
+    writer = RecordingWriter(file, CLASSES, {"mission": mission})
     for one in said:
         numbers[one.source] = numbers.get(one.source, 0) + 1
         envelope = Envelope(WIRE_VERSION, one.source, numbers[one.source], one.at_s, one.cause, one.body)
-        writer.write(key_of(MISSION, one.address, one.conversation), write(envelope), one.at_s)
+        writer.write(key_of(mission, one.address, one.conversation), write(envelope), one.at_s)
     writer.finish()
     return file
 

@@ -35,7 +35,11 @@ async def compare(
         NothingSelected: No message has one of these keys.
     """
     with opened(first) as one, opened(second) as other:
-        pairs = pairs_in(one.contents().counts, other.contents().counts)
+        contents = one.contents(), other.contents()
+        missions = [found.about.get("mission", "") for found in contents]
+        if all(missions) and missions[0] != missions[1]:
+            say(f"two missions: {first} is of {missions[0]}, {second} of {missions[1]}")
+        pairs = pairs_in(*(found.counts for found in contents))
         found = compared(one.messages(keys), other.messages(keys), tolerances, pairs)
         if keys and not found:
             raise NothingSelected(f"neither {first} nor {second} has a message whose key matches {' or '.join(keys)}")

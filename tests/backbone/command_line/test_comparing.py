@@ -70,6 +70,19 @@ async def test_of_two_files_the_one_that_is_no_recording_is_named(tmp_path: Path
     assert "recover" not in refused.value.remedy
 
 
+@pytest.mark.parametrize(("missions", "is_told"), [(("night", "day"), True), (("night", "night"), False)])
+async def test_recordings_of_two_missions_are_named(
+    missions: tuple[str, str], is_told: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Else the differences seem to be faults of one mission."""
+    first, second = (tmp_path / f"{number}.mcap" for number in (1, 2))
+    for path, mission in zip((first, second), missions, strict=True):
+        path.write_bytes(recorded([Said(1.0, SCOUT, Conversation.LOG, EVENT)], mission).getvalue())
+    assert await comparing.compare(first, second, (), {}, as_json=False) is ExitCode.DONE
+    told = f"two missions: {first} is of night, {second} of day\n"
+    assert (told in capsys.readouterr().err) is is_told
+
+
 async def test_keys_that_no_message_has_are_refused(tmp_path: Path) -> None:
     """Else a wrong word in a nightly comparison counts as equal."""
     night = tmp_path / "night.mcap"
