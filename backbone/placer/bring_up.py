@@ -117,6 +117,7 @@ class BringUp:
             NoHost: No host is possible.
         """
         name, until_s = record.spawn.name, self._clock.now_s() + CREATOR_BACK_S * self._clock.rate
+        noted = ""
         while record.phase is PlacementPhase.STARTING:
             self._refuse_unwanted(record)
             try:
@@ -127,7 +128,9 @@ class BringUp:
                     raise
                 if not may_come and self._book.is_alive(record.pin):  # the placer has met it during the question
                     continue
-                self._note(name, f"waits for a creator: {refusal.detail}")
+                if refusal.detail != noted:  # each load report of a host wakes this loop
+                    noted = refusal.detail
+                    self._note(name, f"waits for a creator: {noted}")
                 await self._news.or_at(until_s)
             else:
                 return

@@ -246,6 +246,18 @@ async def test_what_is_lost_with_its_host_is_placed_where_it_can_start(one: Miss
     assert one.creators["a"].spawns == ["w"]
 
 
+@on("a", "b")
+async def test_a_wait_for_a_creator_is_one_line_of_the_story(one: Mission) -> None:
+    """Each load report of another host wakes the wait, and a line for each pushes older events out of the story."""
+    await one.start("scout", "scout1", host="a")
+    await one.crash("creator-a")
+    for _ in range(20):
+        one.creators["b"].tell_load()
+        await one.clock.sleep_s(0.5)
+    waits = [line for line in await one.story("scout1") if line.startswith("waits for a creator")]
+    assert waits == ["waits for a creator: no host for scout1: a: its creator is gone; b: not a, which was asked for"]
+
+
 @on("a")
 async def test_what_cannot_be_placed_is_reported_as_absent_with_its_cause(one: Mission) -> None:
     await one.start("watcher", "w")
