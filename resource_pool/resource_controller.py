@@ -334,15 +334,15 @@ class ResourceController(Component[R], Generic[R]):
         }
 
     def _check_sender(self, asked: Envelope[Message]) -> None:
-        """Refuse a command of a present hold from a component that may not command it.
+        """Refuse a command that names no ARC, or is of a present hold and from a component that may not command it.
 
         Raises:
-            NotFromYou: The source may not command under this hold.
+            NotFromYou: The source is no ARC, or may not command under this hold.
         """
         order: Any = asked.body  # each of ``commands`` has the fields ``arc`` and ``epoch``
         hold = self.holds.find(order.arc, order.epoch)
-        if hold is not None and not self.may_command(asked.source, hold, order):
-            raise self._stranger(asked.source, f"{type(order).__name__} for {order.arc}")
+        if not order.arc or (hold is not None and not self.may_command(asked.source, hold, order)):
+            raise self._stranger(asked.source, f"{type(order).__name__} for {order.arc or 'no ARC'}")
 
     def _stranger(self, source: str, what: str) -> NotFromYou:
         """Count and log an order from a wrong sender; return the refusal."""

@@ -100,6 +100,19 @@ def test_only_the_arc_that_holds_an_rc_commands_it_under_its_name(local_mission:
     run_virtual(main())
 
 
+def test_a_command_that_names_no_arc_is_refused_with_its_sender(local_mission: Any) -> None:
+    """As of ``inject``; it was refused as stale, "scout1:  commands under epoch 0", in an event about no name."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            with pytest.raises(NotFromYou, match="scout1 does not take Drive for no ARC from command_line/inject"):
+                await pool.voice_of("command_line/inject").ask(at("scout1"), Drive(1.0, 1.0), Applied, within_s=1)
+            assert (await state_of(pool, "scout1")).refused_stale == 0
+            assert all(event.subject for event in pool.running["scout1"].story.of())
+
+    run_virtual(main())
+
+
 @pytest.mark.parametrize(
     ("source", "robot_epoch"),
     [
