@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from backbone.creator.decisions import describe
-from backbone.creator.supervision import TERM_S
+from backbone.creator.supervision import LATE_MOST_S, TERM_S
 
 SERVES_WITHIN_S = 10.0  # chosen: of silence; a session opens within 15 ms, or fails after 5 s
 ADMITS_WITHIN_S = 5.0  # chosen: of silence; an answer takes a millisecond
@@ -154,6 +154,7 @@ class _Process:
     pid: int = 0
     serving_pid: int = 0
     deadline_s: float = NEVER_S
+    late_s: float = 0.0
     failure: str = ""
     members: dict[str, _Membership] = field(default_factory=dict)
 
@@ -268,7 +269,8 @@ class SharedProcesses:
         """Record the silence of this process: its deadlines count from the start of the silence.
 
         Args:
-            late_s: Seconds since the last observation in which it could not run; its end may take so much longer.
+            late_s: Seconds since the last observation in which it could not run; its end may take so much longer,
+                and ``LATE_MOST_S`` in all.
         """
         has_changed = False
         for one in self._all.values():
@@ -277,7 +279,8 @@ class SharedProcesses:
             if one.phase is _Phase.STARTING:
                 one.deadline_s, has_changed = now_s - silent_s + SERVES_WITHIN_S, True
             elif one.phase is _Phase.ENDING and late_s:
-                one.deadline_s, has_changed = one.deadline_s + late_s, True
+                late_s = min(late_s, LATE_MOST_S - one.late_s)
+                one.late_s, one.deadline_s, has_changed = one.late_s + late_s, one.deadline_s + late_s, True
             for member in one.members.values():
                 if member.place is _Place.ADMITTING:
                     member.deadline_s, has_changed = now_s - silent_s + ADMITS_WITHIN_S, True

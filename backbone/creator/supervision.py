@@ -16,8 +16,9 @@ Rules:
 * A first start that fails by itself (an exit code above 0, silence) is not repeated, because its owner decides. A
   first start that ends from outside (a signal, a stop) is repeated under any policy, because its owner still waits. If
   it ended so ``FIRST_STARTS`` times, the component itself is the reason (a crash in a C library, a stop of its own).
-* A process that is being ended gets its times without the time in which it could not run. On a full machine the ends of
-  many components would otherwise need signals, and an RC that is killed leaves its hardware as it is.
+* A process that is being ended gets its times without the time in which it could not run, up to ``LATE_MOST_S``. On a
+  full machine the ends of many components would otherwise need signals, and an RC that is killed leaves its hardware as
+  it is.
 * A ready process that is silent for longer than its policy allows hangs. It is killed before it is restarted, so a
   process that was only paused never gets a second copy.
 """
@@ -50,6 +51,7 @@ from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHer
 from backbone.creator.silence import SHOWN_AFTER_S
 
 TERM_S = 0.5  # chosen: like EndProcess.term_s, for ends without an order
+LATE_MOST_S = 20.0  # chosen: four times what a busy machine took to end forty components; then it is too late to obey
 LEAVE_S = 0.5  # chosen: a process ends 10 ms after it has left the bus; two looks at how long it could not run
 FIRST_STARTS = 5  # chosen: more than a person or the system ends by chance; takes under 2 s with its pauses
 NEVER_S = math.inf
@@ -73,6 +75,7 @@ class _End:
         ordered: False if it is ended because it did not become ready.
         stage: The last step.
         not_heard: True if the request to stop got no answer, because the process may be ending by itself.
+        late_s: Seconds by which its times are longer so far.
     """
 
     ask_s: float
@@ -80,6 +83,7 @@ class _End:
     ordered: bool
     stage: EndedBy = EndedBy.ITSELF
     not_heard: bool = False
+    late_s: float = 0.0
 
 
 @dataclass
@@ -238,13 +242,15 @@ class Supervision:
         """Record the silence of its process; ignored for a component without a process.
 
         Args:
-            late_s: Seconds since the last observation in which it could not run; its end may take so much longer.
+            late_s: Seconds since the last observation in which it could not run; its end may take so much longer,
+                and ``LATE_MOST_S`` in all.
         """
         one = self._all.get(name)
         if one is None:
             return []
         if one.end is not None:
-            one.deadline_s += late_s
+            late_s = min(late_s, LATE_MOST_S - one.end.late_s)
+            one.end.late_s, one.deadline_s = one.end.late_s + late_s, one.deadline_s + late_s
             return self._and_wake([]) if late_s else []
         if one.phase is Phase.STARTING:
             one.deadline_s = min(now_s - silent_s + one.ready_within_s, one.began_s + START_MOST_S)

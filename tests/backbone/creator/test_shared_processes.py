@@ -21,7 +21,7 @@ from backbone.creator.shared_processes import (
     SharedProcesses,
     SignalProcess,
 )
-from backbone.creator.supervision import TERM_S
+from backbone.creator.supervision import LATE_MOST_S, TERM_S
 
 NAMES = ("scout1", "scout2", "radio", "video1")
 HOMES = {"scout1": "pool", "scout2": "pool", "radio": "pool", "video1": "other"}
@@ -236,6 +236,8 @@ def test_a_process_that_could_not_run_while_it_ends_gets_that_time_more() -> Non
     shared.member_ended(1, 0, 5.0)
     assert shared.observed(7, 0.0, 5.25, late_s=0.25) == [ProcessesWakeAt(5.25 + TERM_S)]
     assert shared.observed(7, 0.2, 5.5) == []
+    shared.observed(7, 0.2, 105.5, late_s=100.0)
+    assert without_wake(shared.woken(5.0 + TERM_S + LATE_MOST_S)) == [SignalProcess("pool", 7, signal.SIGKILL)]
 
 
 def test_who_is_wanted_while_the_process_ends_gets_a_new_one() -> None:

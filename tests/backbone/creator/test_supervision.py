@@ -21,7 +21,7 @@ from backbone.creator.decisions import (
     describe,
 )
 from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, RestartPolicy
-from backbone.creator.supervision import FIRST_STARTS, LEAVE_S, TERM_S, Supervision
+from backbone.creator.supervision import FIRST_STARTS, LATE_MOST_S, LEAVE_S, TERM_S, Supervision
 
 
 def running(policy: RestartPolicy | None = None, *, asked_by_signal: bool = False) -> Supervision:
@@ -59,6 +59,18 @@ def test_time_in_which_a_process_could_not_run_is_added_to_its_times_to_end() ->
     assert supervision.woken(10.5 + LEAVE_S) == [SupervisionWakesAt(10.75 + LEAVE_S)]
     supervision.woken(10.75 + LEAVE_S)
     assert supervision.observed("scout1", 0.2, 11.5, 0.25) == [SupervisionWakesAt(11.5 + LEAVE_S)]
+
+
+def test_a_process_that_can_never_run_is_killed_after_a_bounded_time() -> None:
+    """Else a mission waits for minutes for a process that computes with a low share of a full machine."""
+    supervision, now_s, sent = running(), 10.0, list[SendSignal]()
+    supervision.end_ordered("scout1", 1.5, 0.5, now_s)
+    while len(sent) < 2 and now_s < 100.0:
+        now_s += 0.25
+        supervision.observed("scout1", 0.0, now_s, 0.25)
+        sent += [one for one in supervision.woken(now_s) if isinstance(one, SendSignal)]
+    assert [one.number for one in sent] == [signal.SIGTERM, signal.SIGKILL]
+    assert now_s == 10.0 + 1.5 + 0.5 + LATE_MOST_S
 
 
 def test_a_process_that_could_run_gets_no_more_time_to_end() -> None:
