@@ -12,11 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import get_origin
 
-from backbone.errors import Refusal, defined_at
+from backbone.errors import defined_at
 from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, write
 from mission_control.modules.graph import Graph, GraphRefused, Member, WiringFault
 from mission_control.modules.module import Module
-from mission_control.modules.orders import WrongModule, is_message
+from mission_control.modules.orders import WrongModule, is_message, unsendable
 from mission_control.modules.ports import Port, kinds_of_ports, type_name
 
 
@@ -154,10 +154,6 @@ def judge_of_sent(
             try:
                 reader.read(write(Envelope(WIRE_VERSION, source, 1, 0.0, "", value), most), most)
             except Exception as error:  # also a field of a class that no message may have
-                cause = error.detail if isinstance(error, Refusal) else error
-                told = f"update of {member.name} returned {key}, which cannot be sent: {cause}"
-                raise WrongModule(
-                    told, remedy="Return fields of the declared types, in a message that fits."
-                ) from error
+                raise unsendable(f"update of {member.name} returned {key}, which", key, error) from error
 
     return judge

@@ -8,13 +8,14 @@ from typing import Annotated, TypeGuard
 
 import msgspec
 
+from backbone.errors import Refusal
 from backbone.import_faults import import_fault
 from backbone.keys import Conversation
 from backbone.naming import did_you_mean
 from backbone.quality import Quality
 from backbone.ranges import Values
 from backbone.reading_anew import WrongClass
-from backbone.wire import Message
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, Message, OversizedMessage
 from mission_control.modules.graph import Member
 from mission_control.modules.module import Module
 from mission_control.modules.unit_schedule import Trigger
@@ -25,6 +26,9 @@ class WrongModule(WrongClass):
 
     code = "module.class"
     remedy = "Write the class as package.module:Class, derived from mission_control.modules.module:Module."
+
+
+UNSENDABLE = "Return fields of the declared types, and memory without gaps."
 
 
 class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -154,3 +158,18 @@ def load_module_class(class_path: str) -> type[Module]:
     if not (isinstance(found, type) and issubclass(found, Module)):
         raise WrongModule(f"{class_path} is no module", class_path=class_path)
     return found
+
+
+def unsendable(told: str, key: str, error: Exception) -> WrongModule:
+    """Return the refusal of a value that cannot be sent at its key because of this error.
+
+    Args:
+        told: The value, as the begin of a sentence.
+    """
+    cause = error.detail if isinstance(error, Refusal) else error
+    remedy = error.remedy if isinstance(error, Refusal) else UNSENDABLE
+    limits = (MAX_MESSAGE_BYTES, MAX_LARGE_MESSAGE_BYTES)
+    if isinstance(error, OversizedMessage) and error.facts.get("most_bytes") not in limits:
+        declared = f'<quality key="{key}" most-bytes="{error.facts.get("bytes")}"/>'
+        remedy = f"Declare {declared} or more in the mission file, or send less in one value."
+    return WrongModule(f"{told} cannot be sent: {cause}", remedy=remedy)

@@ -32,7 +32,14 @@ from mission_control.modules.arrangement import judged
 from mission_control.modules.choice import SourceChoice
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.graph import Graph
-from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, is_message, output_address
+from mission_control.modules.orders import (
+    ModuleOrder,
+    UnitParameters,
+    WrongModule,
+    is_message,
+    output_address,
+    unsendable,
+)
 from mission_control.modules.os_threads import ThreadPlace
 from mission_control.modules.ports import kinds_of_ports, type_name
 from mission_control.modules.unit_deadlines import UnitDeadlines
@@ -45,7 +52,6 @@ if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
     from numpy.typing import NDArray
 
 _TABLES = ("overwritten", "modules")  # suffixes in the statistics, so that each entry has its own name
-UNSENDABLE = "Return fields of the declared types, and memory without gaps."
 REPORT_EVERY_S = 1.0  # chosen: a person reads no faster; seconds of the mission
 
 
@@ -223,9 +229,7 @@ class UnitComponent(Component[UnitParameters]):
                 try:
                     self.bus.publish(output_address(self.address, key), Conversation.OUTPUTS, value)
                 except (Refusal, TypeError, BufferError) as error:  # a field of another class; memory with gaps
-                    cause, remedy = (error.detail, error.remedy) if isinstance(error, Refusal) else (error, UNSENDABLE)
-                    told = f"{key}, a {type(value).__name__}, cannot be sent: {cause}"
-                    raise WrongModule(told, remedy=remedy) from error
+                    raise unsendable(f"{key}, a {type(value).__name__},", key, error) from error
         if now_s >= self._report_again_s:
             self._report_misses(now_s)
 

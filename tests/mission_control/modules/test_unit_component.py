@@ -27,12 +27,12 @@ from backbone.exchange import UnknownModule
 from backbone.keys import Conversation
 from backbone.module_waits import AskModule, AwaitedInput, ModuleWaits
 from backbone.quality import QUALITY, OutputQuality, Urgency
-from backbone.wire import WIRE_VERSION, Envelope, Message, write
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES, WIRE_VERSION, Envelope, Message, OversizedMessage, write
 from mission_control.modules.arrangement import UnitOrder, arranged
 from mission_control.modules.execution_unit import NeverRuns
 from mission_control.modules.graph import GraphRefused
 from mission_control.modules.module import Module
-from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule
+from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, unsendable
 from mission_control.modules.unit_component import UnitComponent
 
 
@@ -211,6 +211,20 @@ def test_what_a_unit_cannot_run_is_refused_with_the_reason(
             unit_on(LocalNetwork(), "one", parameters)
 
     run_virtual(main())
+
+
+@pytest.mark.parametrize(
+    ("most", "remedy"),
+    [
+        (4096, 'Declare <quality key="ball" most-bytes="5000"/> or more in the mission file'),
+        (MAX_LARGE_MESSAGE_BYTES, OversizedMessage.remedy),  # nothing longer can be declared
+    ],
+)
+def test_a_value_over_its_declared_limit_names_the_attribute_and_a_value(most: int, remedy: str) -> None:
+    refused = OversizedMessage("Ball of 5000 bytes", bytes=5000, most_bytes=most)
+    told = unsendable("ball, a Ball,", "ball", refused)
+    assert told.detail == "ball, a Ball, cannot be sent: Ball of 5000 bytes"
+    assert told.remedy.startswith(remedy)
 
 
 class Gap(Message, frozen=True):
