@@ -67,7 +67,7 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
             told = f"{component_of(at)} ended, hung or was cut off while it exchanged {asked.module}: {cause}"
             raise OutcomeUnknown(told, remedy=f"See 'scout-backbone why {component_of(at)}', and 'log'.") from error
     counts = "round" if question is asked else "command" if at.startswith(f"{Subsystem.MISSION_CONTROL}/") else "call"
-    show([_told(asked, swapped, counts)])
+    show([result_line(asked, swapped, counts)])
     if swapped.remark:
         say(swapped.remark)
     return ExitCode.DONE if swapped.is_proved else ExitCode.REFUSED
@@ -89,14 +89,21 @@ async def swapped_by(bus: Bus, clock: Clock, at: str, question: SwapModule | Swa
         return await ask_until_answered(bus, clock, at, again, Swapped, each_s=within_s, within_s=AGAIN_WITHIN_S)
 
 
-def _told(asked: SwapModule, swapped: Swapped, counts: str) -> str:
+def result_line(asked: SwapModule, swapped: Swapped, counts: str) -> str:
+    """Return the result for people; a new part that did nothing in its whole trial is not called proved.
+
+    Args:
+        counts: The unit of work of such a part: round, command or call.
+    """
     state = "with the state of the old one" if swapped.keeps_state else "from a fresh state"
     times = f"{swapped.warming_s:.2f} s beside the old one"
     if swapped.proving_s or swapped.is_proved:
         times += f", {swapped.proving_s:.2f} s and {counted(swapped.rounds, counts)} to prove itself"
     if swapped.is_proved:
         after = f"; {swapped.cause}" if swapped.cause else ""
-        return f"{asked.module}: proved, {asked.class_path} goes on {state} ({times}){after}"
+        is_tried = swapped.rounds or swapped.proving_s < asked.prove_s  # the end of its trial has another reason
+        result = "proved" if is_tried else "not proved yet"
+        return f"{asked.module}: {result}, {asked.class_path} goes on {state} ({times}){after}"
     return f"{asked.module}: returned, the old one goes on ({times}): {swapped.cause}"
 
 
