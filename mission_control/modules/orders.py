@@ -25,7 +25,7 @@ class WrongModule(WrongClass):
     """A class path does not name a module, or the module refuses its parameters."""
 
     code = "module.class"
-    remedy = "Write the class as package.module:Class, derived from mission_control.modules.module:Module."
+    remedy = "Write the class as package.module:Class, importable on the unit's host, and derive it from Module."
 
 
 UNSENDABLE = "Return fields of the declared types, and memory without gaps."

@@ -8,7 +8,7 @@ import pytest
 
 from mission_control.modules.orders import WrongModule, load_at
 
-MEND, PATH = "Mend the file", "Write the class as package.module:Class"
+MEND, PATH = "Mend the file", "Write the class as package.module:Class, importable on the unit's host"
 
 
 @pytest.mark.parametrize(
