@@ -137,6 +137,7 @@ class Recording:
         if summary is None or summary.statistics is None:
             raise NoRecording("the recording has no index")
         self._summary: Summary = summary
+        self._name = getattr(file, "name", "the recording")
 
     def contents(self) -> Contents:
         """Return the summary, from the index and the facts about the mission alone.
@@ -150,7 +151,7 @@ class Recording:
         counts = [
             KeyCount(*_named(channel), counted.get(number, 0)) for number, channel in self._summary.channels.items()
         ]
-        with _refusing_damage():
+        with _refusing_damage(self._name):
             about = next((one.metadata for one in self._reader.iter_metadata() if one.name == ABOUT), {})
         return Contents(
             dict(about),
@@ -166,7 +167,7 @@ class Recording:
         Raises:
             NoRecording: The mission file is damaged.
         """
-        with _refusing_damage():
+        with _refusing_damage(self._name):
             files = (one for one in self._reader.iter_attachments() if one.name == "mission.xml")
             found = next(files, None)
             return found.data.decode() if found is not None else ""
@@ -214,7 +215,7 @@ class Recording:
         end_ns = None if until_s is None else round(until_s * NS)
         begin_ns = max(0, round(since_s * NS))
         found = self._reader.iter_messages(topics, starting_at=begin_ns, ending_at=end_ns, reverse=newest_first)
-        with _refusing_damage():
+        with _refusing_damage(self._name):
             for schema, channel, message in found:
                 recorded = _recorded(channel, message)
                 if (not patterns or is_meant(recorded.key, patterns)) and source in ("", recorded.source):
@@ -222,11 +223,11 @@ class Recording:
 
 
 @contextmanager
-def _refusing_damage() -> Iterator[None]:
+def _refusing_damage(name: object) -> Iterator[None]:
     try:
         yield
     except DAMAGED as error:
-        raise NoRecording(f"the recording is damaged: {error}") from error
+        raise NoRecording(f"{name} is damaged: {error}") from error
 
 
 def open_file(path: Path) -> IO[bytes]:

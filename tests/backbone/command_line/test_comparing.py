@@ -70,6 +70,16 @@ async def test_of_two_files_the_one_that_is_no_recording_is_named(tmp_path: Path
     assert "recover" not in refused.value.remedy
 
 
+async def test_of_two_recordings_the_damaged_one_is_named(tmp_path: Path) -> None:
+    good, bad = tmp_path / "good.mcap", tmp_path / "bad.mcap"
+    whole = recorded([Said(float(n), SCOUT, Conversation.LOG, EVENT) for n in range(99)]).getvalue()
+    chunk = whole.index(b"\x28\xb5\x2f\xfd")  # RFC 8878: the begin of each frame of Zstandard
+    good.write_bytes(whole)
+    bad.write_bytes(whole[: chunk + 20] + b"damaged" + whole[chunk + 27 :])
+    with pytest.raises(NoRecording, match=rf"{bad} is damaged: "):
+        await comparing.compare(good, bad, (), {}, as_json=False)
+
+
 @pytest.mark.parametrize(("missions", "is_told"), [(("night", "day"), True), (("night", "night"), False)])
 async def test_recordings_of_two_missions_are_named(
     missions: tuple[str, str], is_told: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
