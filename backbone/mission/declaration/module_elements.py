@@ -134,7 +134,7 @@ class QualityElement(Declared):
     )
     most_bytes: MessageBytes = Field(
         default=MAX_LARGE_MESSAGE_BYTES,
-        description="A longer value is refused; beyond 8388608 bytes values stay on their host.",
+        description="Longest value, 1 to 67108864; a longer one is refused, and beyond 8388608 it stays on its host.",
     )
 
 

@@ -96,6 +96,13 @@ def test_bytes_that_are_no_utf_8_are_refused_where_they_stand(tmp_path: Path) ->
     assert (fault.line, fault.column) == (2, 6)
 
 
+@pytest.mark.parametrize("most", ["0", "99999999999"])
+def test_an_illegal_size_of_a_value_names_the_legal_ones(tmp_path: Path, most: str) -> None:
+    quality = f'<modules><quality key="ball" most-bytes="{most}"/></modules>'
+    faults = faults_in(tmp_path, f'<mission name="small" priority="1">{quality}</mission>')
+    assert any("1 to 67108864" in fault.remedy for fault in faults)
+
+
 @pytest.mark.parametrize("encoding", ["utf-16", "iso-8859-1"])
 def test_other_encodings_are_refused(tmp_path: Path, encoding: str) -> None:
     text = f'<?xml version="1.0" encoding="{encoding}"?>\n{SMALL.read_text()}'
