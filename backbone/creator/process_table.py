@@ -42,7 +42,7 @@ Table = Mapping[int, Process]
 
 
 def read_table() -> dict[int, Process]:
-    """Return all processes of this machine by pid."""
+    """Return all processes that this one may signal, by pid."""
     return {pid: read_line(line) for pid, line in processes.table_lines().items()}
 
 

@@ -334,7 +334,7 @@ class _ZygoteProcess:
                 self._tell(Exited(pid, sweep.returncode))
 
     def _end_all(self) -> None:
-        """End all descendants of this process: SIGTERM, a moment, SIGKILL."""
+        """End all descendants of this process: SIGTERM, a moment, SIGKILL. Those of other accounts are left."""
         removed = self._hide_run_directory()
         self._selector.unregister(self._channel)  # else the selector reports its end for ever
         now_s = time.monotonic()
@@ -352,6 +352,8 @@ class _ZygoteProcess:
                     victims |= {pid for pid, process in table.items() if process.parent == self._own_pid}
                 processes.send(victims, signal.SIGKILL)
                 wait_s = kill_zygotes_at_s - now_s if now_s < kill_zygotes_at_s else None
+                if wait_s is None and not victims:
+                    break
             if self._selector.select(wait_s):
                 self._signals.recv(1 << 12)
         if removed is not None:

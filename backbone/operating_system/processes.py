@@ -32,12 +32,15 @@ def threads() -> int:
 
 
 def table_lines() -> dict[int, str]:
-    """Return pid → its line, as ``/proc/<pid>/stat`` has it, of all processes of this machine."""
+    """Return pid → its line, as ``/proc/<pid>/stat`` has it, of all processes that this one may signal.
+
+    Processes of other accounts may have any name, so their lines are left out.
+    """
     lines = {}
-    for folder in os.listdir("/proc"):
-        if folder.isdigit():
-            with suppress(OSError):
-                lines[int(folder)] = table_line(int(folder))
+    for pid in map(int, filter(str.isdigit, os.listdir("/proc"))):
+        with suppress(OSError):
+            os.kill(pid, 0)
+            lines[pid] = table_line(pid)
     return lines
 
 
@@ -77,9 +80,9 @@ def processor_times_s(pid: int) -> tuple[float, float] | None:
 
 
 def send(pids: Iterable[int], number: signal.Signals) -> None:
-    """Send the signal to each process; skip processes that have ended."""
+    """Send the signal to each process; skip processes that have ended, or have become another account's."""
     for pid in pids:
-        with suppress(ProcessLookupError):
+        with suppress(ProcessLookupError, PermissionError):
             os.kill(pid, number)
 
 
