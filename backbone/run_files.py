@@ -65,10 +65,10 @@ class SeveralMissions(Refusal):
 
 
 class UnsafeDirectory(Refusal):
-    """The folder of the run files belongs to another user, or other users may write into it."""
+    """The folder of the run files, or the one around it, is another user's, or other users may write into it."""
 
     code = "run.unsafe_directory"
-    remedy = "Set XDG_RUNTIME_DIR to a folder of your own with mode 0700."
+    remedy = "Set XDG_RUNTIME_DIR to a folder of your own with mode 0700. You can command only your own missions."
 
 
 class RunFolderUnusable(Refusal):
@@ -112,7 +112,7 @@ def run_directory(mission: str) -> Path:
     Raises:
         IllegalName: The mission's name is no legal name.
         RunFolderRelative: ``XDG_RUNTIME_DIR`` is a relative path.
-        UnsafeDirectory: Another user could write files there.
+        UnsafeDirectory: Another user could write files there, or ``XDG_RUNTIME_DIR`` is another user's.
         RunFolderUnusable: The system refused.
     """
     return _directory() / legal(mission)
@@ -294,6 +294,8 @@ def _directory() -> Path:
         if not runtime:
             base.mkdir(mode=0o700, exist_ok=True)
             _check_private(base)
+        elif base.exists():
+            _check_own(base)
         directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         _check_private(directory)
     except OSError as error:
@@ -303,6 +305,13 @@ def _directory() -> Path:
 
 def _unusable(directory: Path, error: OSError) -> RunFolderUnusable:
     return RunFolderUnusable(f"{directory}: {error.strerror or error}", directory=str(directory))
+
+
+def _check_own(base: Path) -> None:
+    # su keeps XDG_RUNTIME_DIR: root would make folders there that its owner could not use.
+    owner = base.stat().st_uid
+    if owner not in (0, os.getuid()):
+        raise UnsafeDirectory(f"{base} belongs to user {owner}", directory=str(base))
 
 
 def _check_private(directory: Path) -> None:

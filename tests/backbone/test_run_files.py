@@ -118,6 +118,16 @@ def test_removing_leaves_nothing_and_may_be_done_twice(runtime_directory: Path) 
     assert list((runtime_directory / "scout-backbone").iterdir()) == []
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder to another account")
+def test_in_the_folder_of_another_account_nothing_is_made(runtime_directory: Path) -> None:
+    os.chown(runtime_directory, 65534, 65534)
+    for access in (run_files.find, run_files.kept_directory, lambda: run_files.run_directory("m")):
+        with pytest.raises(run_files.UnsafeDirectory) as refused:
+            access()
+        assert refused.value.detail == f"{runtime_directory} belongs to user 65534"
+    assert list(runtime_directory.iterdir()) == []
+
+
 def test_the_folder_is_this_users_alone(runtime_directory: Path) -> None:
     path = run_files.write(up("iros2001"))
     assert path.parent.stat().st_mode & 0o777 == 0o700
