@@ -54,7 +54,7 @@ class MissionNotUp(Refusal):
     """No mission of this name, or none at all, is up on this machine."""
 
     code = "run.not_up"
-    remedy = "Start it with 'scout-backbone up MISSION.xml', or name a hub elsewhere with --connect."
+    remedy = "Start it as this user with 'scout-backbone up MISSION.xml', or name a hub elsewhere with --connect."
 
 
 class SeveralMissions(Refusal):
@@ -230,7 +230,7 @@ def find(mission: str | None = None) -> RunFile:
     names = ", ".join(run_file.mission for run_file in up)
     if mission is None:
         if not up:
-            raise MissionNotUp("no mission is up on this machine")
+            raise MissionNotUp("no mission is up on this machine for this user")
         if len(up) > 1:
             raise SeveralMissions(f"several missions are up: {names}", missions=names)
         return up[0]
