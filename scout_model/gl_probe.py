@@ -146,7 +146,7 @@ def _try(backend: OpenGl, trial_time_s: float) -> GlTrial | None:
     environment.pop("PYOPENGL_PLATFORM", None)  # mujoco sets it; a child process would inherit the wrong value
     try:
         trial = subprocess.run(
-            [sys.executable, "-m", "scout_model.gl_trial"],
+            [sys.executable, "-P", "-m", "scout_model.gl_trial"],
             env=environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,

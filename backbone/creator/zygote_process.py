@@ -142,7 +142,7 @@ def main() -> NoReturn:
 def fresh_interpreter(descriptor: int, settings: ZygoteSettings) -> list[str]:
     """Return the command that runs ``main`` in an interpreter of its own."""
     program = f"from {__name__} import main; main()"
-    return [sys.executable, "-c", program, str(descriptor), msgspec.json.encode(settings).decode()]
+    return [sys.executable, "-P", "-c", program, str(descriptor), msgspec.json.encode(settings).decode()]
 
 
 @dataclass(frozen=True, slots=True)

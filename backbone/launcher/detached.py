@@ -37,7 +37,8 @@ def up_detached(mission: str, mission_file: Path, options: UpOptions) -> int:
     Only the launcher's verdict decides, because its process still lives while it cleans up after a failure.
     """
     told, telling = os.pipe()
-    command = [sys.executable, "-m", "backbone.command_line.cli", "up", str(mission_file.absolute()), "--headless"]
+    program = ["-P", "-m", "backbone.command_line.cli"]  # -P: no module of the working folder
+    command = [sys.executable, *program, "up", str(mission_file.absolute()), "--headless"]
     command += ["--tell-fd", str(telling), "--speed", str(options.speed)]
     command += ["--trace", str(options.trace.absolute())] if options.trace else []
     command += ["--for", str(options.for_s)] if options.for_s is not None else []

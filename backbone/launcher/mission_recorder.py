@@ -187,7 +187,7 @@ class MissionRecorder:
 
     async def _started(self) -> Process:
         path = first_free(self._path)
-        command = ["-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
+        command = ["-P", "-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
         return await asyncio.create_subprocess_exec(
             *(sys.executable, *command, *self._options),
             stdin=PIPE,

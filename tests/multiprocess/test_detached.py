@@ -41,9 +41,10 @@ def environment(folder: Path, mark: str) -> dict[str, str]:
     return {**os.environ, "XDG_RUNTIME_DIR": str(folder), MARK: mark, "PYTHONPATH": os.pathsep.join(paths)}
 
 
-def command(folder: Path, mark: str, *words: str) -> subprocess.CompletedProcess[str]:
+def command(folder: Path, mark: str, *words: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [str(BIN / "scout-backbone"), *words],
+        cwd=cwd,
         env=environment(folder, mark),
         capture_output=True,
         text=True,
@@ -67,6 +68,25 @@ def assert_up_says(exit_code: int, folder: Path, change: dict[str, str]) -> None
             with contextlib.suppress(psutil.Error):
                 process.kill()
     assert not left
+
+
+def test_no_process_of_a_mission_imports_modules_of_the_working_folder(tmp_path: Path) -> None:
+    """Another account can put files into a shared folder, and a folder of one's own may have a ``random.py``."""
+    shared, mark = tmp_path / "shared", uuid.uuid4().hex
+    shared.mkdir()
+    for module in ("msgspec", "random"):
+        (shared / f"{module}.py").write_text(f"open({str(tmp_path / 'imported')!r}, 'a').write(__name__)\n")
+    try:
+        up = command(tmp_path, mark, "up", str(SMALLEST), "--detach", "--record", "run.mcap", cwd=shared)
+        assert up.returncode == 0, up.stderr
+    finally:
+        down = command(tmp_path, mark, "down")
+        left = wait_gone(mark, 10.0)
+        for process in left:
+            process.kill()
+    assert down.returncode == 0, down.stderr
+    assert not left
+    assert not (tmp_path / "imported").exists()
 
 
 FAILS = {"</hosts>": GRABBER, '<parameter name="frame_rate_hz" value="15"/>': ""}
