@@ -92,13 +92,17 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
         enough.set()
     await printer.end()
     if not came:
-        at_keys = f" at {' or '.join(wanted.keys)}; see 'scout-backbone top'" if wanted.keys else ""
-        say(f"no message came{at_keys}")
+        _say_that_none_came(wanted)
     elif not shown:
         say(f"none of {counted(came, 'message')} has a value in {wanted.field!r}; --json shows their fields")
     if dropped := printer.dropped + sum(one.dropped for one in subscribed):
         say(f"incomplete: {counted(dropped, 'message')} came faster than they were read")
     return ExitCode.UNEXPECTED if printer.is_stuck else ExitCode.DONE
+
+
+def _say_that_none_came(wanted: Watched) -> None:
+    at_keys = f" at {' or '.join(wanted.keys)}; 'scout-backbone top' shows all keys" if wanted.keys else ""
+    say(f"no message came{at_keys}")
 
 
 @asynccontextmanager
@@ -145,8 +149,11 @@ async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
 async def _show_rates(bus: Bus, heard: Sequence[TrafficRow], wanted: Watched, printer: LinePrinter) -> None:
     facts = await ask_facts(bus)
     rows = with_facts(heard, facts, bus.mission, wanted.keys)
-    for line in map(json.dumps, rows) if wanted.as_json else [*traffic_lines(rows), ""]:
+    lines = map(json.dumps, rows) if wanted.as_json else [*traffic_lines(rows), ""]
+    for line in lines if rows else []:
         printer.put(line)
+    if not rows:
+        _say_that_none_came(wanted)
     if facts.silent:
         say(f"without the counts of {', '.join(sorted(facts.silent))}, which did not answer")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
+from functools import partial
 
 import pytest
 
@@ -203,10 +204,18 @@ def test_who_watches_is_told_of_an_absence_of_the_hub(
 
 @pytest.mark.parametrize(
     ("keys", "told"),
-    [((), "no message came"), (("a//b", "*/[c"), "no message came at a//b or */[c; see 'scout-backbone top'")],
+    [
+        ((), "no message came"),
+        (("a//b", "*/[c"), "no message came at a//b or */[c; 'scout-backbone top' shows all keys"),
+    ],
 )
+@pytest.mark.parametrize("command", [watching.watch, partial(watching.top, once=True)], ids=["watch", "top"])
 def test_an_end_without_a_message_is_told(
-    keys: tuple[str, ...], told: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    command: Callable[[Where, Watched], Awaitable[ExitCode]],
+    keys: tuple[str, ...],
+    told: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     network, clock = LocalNetwork("night"), VirtualClock()
 
@@ -215,8 +224,10 @@ def test_an_end_without_a_message_is_told(
         yield LocalBus(network, SELF, clock), clock
 
     monkeypatch.setattr(watching, "connected", connected)
-    run_virtual(watching.watch(ANY, Watched(keys, for_s=1.0)))
-    assert told in capfd.readouterr().err.splitlines()
+    run_virtual(command(ANY, Watched(keys, for_s=1.0)))
+    shown = capfd.readouterr()
+    assert told in shown.err.splitlines()
+    assert shown.out == ""
 
 
 @pytest.mark.parametrize(("field", "is_told"), [("what", False), ("waht", True)])
