@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from backbone.addresses import NAMESERVER
+from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.interface import Bus, Clock
 from backbone.debug_views import (
     LOOK_AGAIN_S,
@@ -24,8 +24,9 @@ from backbone.debug_views import (
 )
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.naming import Subsystem
+from backbone.placer.messages import AskPlacement, Placement
 from backbone.wire import Envelope, UnknownMessage
 from ui_console.model.message_views import PixelPicture
 
@@ -45,13 +46,26 @@ async def find_behavior(bus: Bus, name: str) -> str:
     """Return the address of the behavior of this name.
 
     Raises:
-        Refusal: There is no such component, or it is not a behavior; the detail names similar names.
+        Refusal: There is no such component, it does not run now, or it is not a behavior.
         LinkError: The nameserver did not answer.
     """
-    found = (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component
+    try:
+        found = (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component
+    except UnknownName as unknown:
+        raise await _not_now(bus, name, unknown) from None
     if not found.address.startswith(f"{Subsystem.MISSION_CONTROL}/"):
         raise NoViews(f"{name} is a {found.type}, no behavior")
     return found.address
+
+
+async def _not_now(bus: Bus, name: str, unknown: UnknownName) -> UnknownName:
+    """Return the refusal, with other words if the placer wants this component, so it is absent for a while."""
+    try:
+        await bus.ask(PLACER, AskPlacement(name), Placement, within_s=REPLY_TIME_S)
+    except (Refusal, LinkError):
+        return unknown
+    remedy = f"'scout-backbone why {name}' says why; try again."
+    return UnknownName(f"{name} does not run now", remedy=remedy, name=name)
 
 
 async def views_of(bus: Bus, behavior: str) -> Views:
