@@ -35,40 +35,46 @@ async def test_a_picture_is_shown_live_in_a_terminal_and_q_leaves() -> None:
     with mission_up() as mission:
         await asyncio.to_thread(mission.wait_for_components, "watch-scout1", "watch-scout2")
         await asyncio.to_thread(has_shown, mission)
-        ours, theirs = pty.openpty()
-        termios.tcsetwinsize(ours, (40, 132))
-        drawn = bytearray()
-        is_shown = asyncio.Event()
+        for terminal in ("xterm-256color", "dumb"):
+            await shows_until_q(mission, terminal)
 
-        def read() -> None:
-            drawn.extend(os.read(ours, 65536))
-            if "▀".encode() in drawn and b"watch-scout1: difference" in drawn:
-                is_shown.set()
 
-        loop = asyncio.get_running_loop()
-        loop.add_reader(ours, read)
-        words = ("look", "watch-scout1", "difference", "--mission", mission.name)
-        process = await asyncio.create_subprocess_exec(
-            str(BIN / "scout-console"),
-            *words,
-            stdin=theirs,
-            stdout=theirs,
-            stderr=theirs,
-            env={**mission.environment, "TERM": "xterm-256color"},
-            start_new_session=True,
-        )
-        os.close(theirs)
-        try:
-            async with asyncio.timeout(WITHIN_S):
-                await is_shown.wait()
-                os.write(ours, b"q")
-                assert await process.wait() == 0
-        finally:
-            if process.returncode is None:
-                process.kill()
-                await process.wait()
-            loop.remove_reader(ours)
-            os.close(ours)
+async def shows_until_q(mission: RunningMission, terminal: str) -> None:
+    """Start the command in a terminal of this ``TERM``; return after a picture, the key, and a good end."""
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(ours, (40, 132))
+    drawn = bytearray()
+    is_shown = asyncio.Event()
+
+    def read() -> None:
+        drawn.extend(os.read(ours, 65536))
+        if "▀".encode() in drawn and b"watch-scout1: difference" in drawn:
+            is_shown.set()
+
+    loop = asyncio.get_running_loop()
+    loop.add_reader(ours, read)
+    words = ("look", "watch-scout1", "difference", "--mission", mission.name)
+    process = await asyncio.create_subprocess_exec(
+        str(BIN / "scout-console"),
+        *words,
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        env={**mission.environment, "TERM": terminal},
+        start_new_session=True,
+    )
+    os.close(theirs)
+    try:
+        async with asyncio.timeout(WITHIN_S):
+            await is_shown.wait()
+            os.write(ours, b"q")
+            assert await process.wait() == 0
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+        loop.remove_reader(ours)
+        os.close(ours)
 
 
 def has_shown(mission: RunningMission) -> None:

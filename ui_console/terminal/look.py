@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from backbone.bus.interface import Bus, Clock
 from backbone.command_line.connection import connected
 from backbone.command_line.listening import watching_end
-from backbone.command_line.standard_streams import can_redraw
 from backbone.command_line.unusable_file import FileUnusable
 from backbone.command_line.where import Where
 from backbone.debug_views import UnknownView, ViewEntry, ViewKind, ViewPicture, ViewValue
@@ -105,7 +104,7 @@ async def _shown(looked: _Looked, options: LookOptions) -> ExitCode:
     if options.as_json or looked.entry.kind is ViewKind.VALUE:
         async with line_writer() as write:
             return await looked.until_end(_printer(write, as_json=options.as_json), options.for_s)
-    if not (sys.stdin.isatty() and can_redraw()):
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise NoTerminal(f"the picture {looked.entry.view} needs a terminal")
     return await _live(looked, options.for_s)
 
