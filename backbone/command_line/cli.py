@@ -296,6 +296,8 @@ def set_(
     """Set priority, parent or a run time of an owner of ARCs, or any parameter; without a value show it."""
     if value is not None and as_json:
         raise typer.BadParameter("--json shows attributes; leave the value out")
+    if value is None and parameter is not None and "=" in parameter:
+        raise typer.BadParameter(f"write the value apart: set {name} {parameter.replace('=', ' ', 1)}")
 
     from backbone.command_line.ordering import print_attributes, set_attribute
 

@@ -80,6 +80,12 @@ def test_a_name_that_no_message_can_contain_is_wrong_usage(words: list[str], nam
     assert "255 printable characters" in done.output
 
 
+def test_a_value_behind_an_equals_sign_is_wrong_usage() -> None:
+    done = CliRunner().invoke(app, ["set", "rc_manager", "aging_s=nan"])
+    assert done.exit_code == 2
+    assert "write the value apart: set rc_manager aging_s nan" in " ".join(done.output.split())
+
+
 HUB = ["--connect", "tcp/127.0.0.1:1"]
 
 
