@@ -39,6 +39,7 @@ class Absence(Message, frozen=True):
         vital: True if the mission cannot work without it (core services).
         is_running: True if it runs and cannot do its work.
         is_repeated: True if it runs, and has failed again and again since that time; at this moment it may work.
+        is_start: True for the mission itself while its first start is not over.
     """
 
     name: Mention
@@ -49,6 +50,7 @@ class Absence(Message, frozen=True):
     vital: bool = False
     is_running: bool = False
     is_repeated: bool = False
+    is_start: bool = False
 
 
 class Stopper(Message, frozen=True):

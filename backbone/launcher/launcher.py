@@ -248,7 +248,8 @@ class Launcher(Component[NoParameters]):
         core = [msgspec.structs.replace(absence, vital=True) for absence in self._keeper.absences()]
         mission = self._wishes.absences()
         if self.outcome.ready_after_s is None:
-            mission.append(Absence(self._description.name, 0.0, "the mission is coming up", self._being_started()))
+            name, doing = self._description.name, self._being_started()
+            mission.append(Absence(name, 0.0, "not all of it is ready", doing, is_start=True))
         lost = self._recorder.absence() if self._recorder is not None else None
         recorders = [*([lost] if lost is not None else []), *self._hand_recorders.absences()]
         return [*core, *mission, *self._others.absences(), *recorders]

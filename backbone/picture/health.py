@@ -4,6 +4,7 @@ Rules of this file: pure; observations go in, the verdict comes out. Each owner 
 (``Component.absences``); this file joins these reports with the absences that the observer found itself.
 
 * ``ok``: no wanted component is absent, and all can do their work.
+* ``starting``: the mission comes up, for at most ``STARTING_MOST_S``; wanted components may be absent.
 * ``degraded``: a wanted component is absent, or cannot do its work, and its owner tries again.
 * ``failed``: a vital component has been absent for longer than ``FAILED_AFTER_S``, or the owner of an absent
   component makes no further attempt to start it.
@@ -11,7 +12,7 @@ Rules of this file: pure; observations go in, the verdict comes out. Each owner 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from enum import StrEnum
 from typing import Annotated
 
@@ -25,12 +26,14 @@ LOOK_EVERY_S = 0.5  # chosen: an absence appears within two rounds; machine seco
 SAY_EVERY_S = 1.0  # chosen: one small message a second from one process; machine seconds
 SILENT_AFTER_S = 2.0  # chosen: two messages of the launcher were missed; machine seconds
 FAILED_AFTER_S = 10.0  # chosen: twice the longest recovery time among the aims (a killed creator, 5 s)
+STARTING_MOST_S = 60.0  # chosen: 400 components start in less; a mission that still waits for a host is degraded
 
 
 class HealthWord(StrEnum):
     """The health of a mission."""
 
     OK = "ok"
+    STARTING = "starting"
     DEGRADED = "degraded"
     FAILED = "failed"
 
@@ -72,11 +75,12 @@ def health(
     return MissionHealth(_word(found, now_s, rate), found)
 
 
-def _word(absent: Iterable[Absence], now_s: float, rate: float) -> HealthWord:
-    word = HealthWord.OK
-    for absence in absent:
-        too_long = absence.vital and now_s - absence.since_s > FAILED_AFTER_S * rate
-        if too_long or not absence.doing:
-            return HealthWord.FAILED
-        word = HealthWord.DEGRADED
-    return word
+def _word(absent: Collection[Absence], now_s: float, rate: float) -> HealthWord:
+    def longer(absence: Absence, than_s: float) -> bool:
+        return now_s - absence.since_s > than_s * rate
+
+    if any(not one.doing or (one.vital and longer(one, FAILED_AFTER_S)) for one in absent):
+        return HealthWord.FAILED
+    if any(one.is_start and not longer(one, STARTING_MOST_S) for one in absent):
+        return HealthWord.STARTING
+    return HealthWord.DEGRADED if absent else HealthWord.OK

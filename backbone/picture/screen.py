@@ -31,7 +31,12 @@ _STATE_STYLE = {
 }
 
 
-_HEALTH_STYLE = {HealthWord.OK: "bold green", HealthWord.DEGRADED: "bold yellow", HealthWord.FAILED: "bold red"}
+_HEALTH_STYLE = {
+    HealthWord.OK: "bold green",
+    HealthWord.STARTING: "bold cyan",
+    HealthWord.DEGRADED: "bold yellow",
+    HealthWord.FAILED: "bold red",
+}
 _TROUBLES_SHARE = 4  # chosen: a quarter of the terminal; the rest still shows components and events
 _FRAME_LINES = 2  # a panel's upper and lower edge
 _EVENTS_MOST = 12  # chosen: more events would leave too few lines for components

@@ -124,7 +124,9 @@ def _with_ranges(texts: Sequence[str]) -> str:
 
 def _trouble(absence: Absence, now_s: float) -> str:
     lasts = f"for {max(0.0, now_s - absence.since_s):.1f} s"
-    if absence.is_repeated:
+    if absence.is_start:
+        trouble = f"has been coming up {lasts}"
+    elif absence.is_repeated:
         trouble = f"has failed again and again {lasts}"
     else:
         trouble = f"{'has not worked' if absence.is_running else 'is absent'} {lasts}"

@@ -71,6 +71,8 @@ class HealthBoard:
 
 
 def _trouble(absence: Absence) -> str:
+    if absence.is_start:
+        return "comes up"
     if absence.is_repeated:
         return "fails again and again"
     return "does not work" if absence.is_running else "is absent"

@@ -362,7 +362,7 @@ class HealthView(msgspec.Struct, frozen=True):
     """The mission's health.
 
     Attributes:
-        word: ``ok``, ``degraded`` or ``failed``.
+        word: ``ok``, ``starting``, ``degraded`` or ``failed``.
         lines: One line for each wanted and absent component: begin, reason and remedy.
     """
 

@@ -24,7 +24,7 @@ WITHOUT_LINK = "x and X reach no robot now: stop at another console, or at the r
 TAKE_KEYS = {Profile.TERMINAL: "t", Profile.PENDANT: "enter"}
 LATE_PICTURE_S = 0.25  # chosen: a few pictures at the usual rate; a person notices longer delays
 ORDER_STYLES = {OrderState.FAILED: "bold red", OrderState.WAITING: "yellow", OrderState.DONE: "bold green"}
-HEALTH_STYLES = {"ok": "green", "degraded": "bold yellow", "failed": "bold red"}
+HEALTH_STYLES = {"ok": "green", "starting": "bold cyan", "degraded": "bold yellow", "failed": "bold red"}
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ export interface Absence {
   vital: boolean;
   is_running: boolean;
   is_repeated: boolean;
+  is_start: boolean;
 }
 
 export type AlarmKind =
