@@ -27,7 +27,7 @@ from backbone.creator.zygote import Zygote
 from backbone.errors import BackboneError
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, launcher_launch, service_launch
 from backbone.launcher.ending_messages import EndMission, MissionEnding
-from backbone.launcher.launcher import LISTING_TIME_S, Launcher
+from backbone.launcher.launcher import Launcher
 from backbone.launcher.mission_recorder import MissionRecorder, recorder_of_mission, require_new
 from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
@@ -37,6 +37,7 @@ from backbone.operating_system.ending_signals import orders_to_end
 from backbone.operating_system.heaps import share_heaps
 
 START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of it
+ORDER_S = 10.0  # chosen: beside twenty busy processes an answer took seconds; a second order ends the last branch
 
 
 async def run_mission(description: MissionDescription, options: UpOptions, observer: BringUpObserver) -> Outcome:
@@ -158,4 +159,4 @@ async def end_mission(bus: Bus, *, at_once: bool = False) -> MissionEnding:
         LinkError: The launcher did not answer.
         Refusal: The launcher is of another release.
     """
-    return await bus.ask(LAUNCHER, EndMission(at_once), MissionEnding, within_s=LISTING_TIME_S)
+    return await bus.ask(LAUNCHER, EndMission(at_once), MissionEnding, within_s=ORDER_S)

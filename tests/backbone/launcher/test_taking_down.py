@@ -11,7 +11,7 @@ import pytest
 
 from backbone import run_files
 from backbone.creator.messages import EndedBy, ProcessEnded
-from backbone.errors import HubUnreachable, NoResponder
+from backbone.errors import HubUnreachable, NoResponder, ReplyTimeout
 from backbone.launcher import detached
 from backbone.launcher.ending_messages import EndMission, MissionEnded, MissionEnding
 from backbone.run_files import RunFile
@@ -86,10 +86,12 @@ ACCOUNTS = [
 ]
 
 
+@pytest.mark.parametrize("answer_s", [0.0, 5.0], ids=["", "full machine"])
 @pytest.mark.parametrize(("account", "words"), ACCOUNTS)
 def test_the_last_line_says_what_the_components_needed(
     account: MissionEnded | MissionEnding | NoResponder,
     words: str,
+    answer_s: float,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -104,7 +106,9 @@ def test_the_last_line_says_what_the_components_needed(
 
             def publish(self, *_given: Any) -> None: ...
 
-            async def ask(self, _address: str, question: Message, *_given: Any, **_by_name: Any) -> Message:
+            async def ask(self, _address: str, question: Message, *_given: Any, within_s: float) -> Message:
+                if answer_s > within_s:
+                    raise ReplyTimeout(f"no answer within {within_s} s")
                 if isinstance(question, EndMission) and not isinstance(account, MissionEnding):
                     return MissionEnding()
                 launcher.terminate()
