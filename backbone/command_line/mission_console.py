@@ -32,7 +32,6 @@ from backbone.picture.health import HealthWord, MissionHealth
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture, holders_line
 from backbone.picture.screen import live_screen
-from backbone.picture.words import absence_line
 from backbone.printable import printable_all
 from backbone.printable_text import printable_lines
 from backbone.rc_manager.messages import AskSchedule, TraceLine
@@ -149,15 +148,15 @@ class ConsoleObserver:
         if is_first and heard.word is HealthWord.OK:
             return
         self._print(f"{envelope.stamp_s:9.2f} s  health {heard.word}")
-        for absence in heard.absent:
-            self._print(f"{'':9}    {absence_line(absence, envelope.stamp_s)}")
+        for line in heard.lines(envelope.stamp_s):
+            self._print(f"{'':9}    {line}")
 
     def _heard_while_coming_up(self, heard: MissionHealth, at_s: float) -> None:
         """From time to time print the components that a long start waits for."""
         if at_s - self._last_progress_s >= PROGRESS_EVERY_S:
             self._last_progress_s = at_s
-            for absence in heard.absent:
-                self.tell(f"  … {absence_line(absence, at_s)}")
+            for line in heard.lines(at_s):
+                self.tell(f"  … {line}")
 
     def _heard(self, envelope: Envelope[StoryEvent | OperatorActed | ComponentState]) -> None:
         said = printable_all(envelope.body)

@@ -10,8 +10,9 @@ from rich.console import Console
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.command_line.mission_console import ConsoleObserver
-from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.component.messages import Absence, ComponentState, LifeState, StoryEvent
 from backbone.keys import Conversation
+from backbone.picture.health import HealthWord, MissionHealth
 
 
 def test_consoles_that_came_and_went_are_not_kept_but_named_by_their_people() -> None:
@@ -35,3 +36,20 @@ def test_consoles_that_came_and_went_are_not_kept_but_named_by_their_people() ->
 
     run_virtual(scene())
     assert "was taken by Anna 99" in lines.getvalue()
+
+
+def test_sixty_components_that_start_are_one_line() -> None:
+    lines = io.StringIO()
+    radios = [Absence(f"radio{number}", 4.0, "no process yet", "its owner asks for it") for number in range(60)]
+
+    async def scene() -> None:
+        clock, network = VirtualClock(), LocalNetwork("lines")
+        await clock.sleep_s(5.0)
+        ConsoleObserver(Console(file=lines), live=False).connected(network.join("backbone/up", clock))
+        launcher = network.join("backbone/launcher", clock)
+        launcher.publish("backbone/launcher", Conversation.HEALTH, MissionHealth(HealthWord.STARTING, radios))
+        await clock.sleep_s(1.0)
+
+    run_virtual(scene())
+    [line] = lines.getvalue().splitlines()
+    assert line.startswith("  … each of 60 components (radio0, ")
