@@ -22,6 +22,7 @@ log = logging.getLogger(__name__)
 
 LOOK_EACH_S = 1.0  # chosen: the hub's token is known milliseconds after a connection, on a busy machine within 1 s
 ANSWER_WITHIN_S = 2.0  # chosen: a link without any message for this time counts as cut
+SLOWEST_ANSWER_S = 16.0  # chosen: a link with a longer round trip is of no use to a person
 LOOKS = 2  # chosen: a link that loses packets may delay one answer; a deaf link is replaced 6 s after it began
 
 
@@ -36,6 +37,7 @@ class Links:
         self._session, self._loop = session, asyncio.get_running_loop()
         self._next_look: dict[int, asyncio.TimerHandle] = {}
         self._looks = not is_hub
+        self._answer_within_s = ANSWER_WITHIN_S  # doubles with each replaced link, because a slow link is not deaf
         self._token = session.liveliness().declare_token(KEY_OF_HUB) if is_hub else None
         changed = zenoh.handlers.Callback(self._changed, indirect=False)
         self._listener = session.info.declare_link_events_listener(changed, history=True)
@@ -72,11 +74,13 @@ class Links:
         found: list[zenoh.Reply] = []
 
         def ended() -> None:
-            if not any(reply.ok for reply in found):  # the end of the time is a reply, too
+            if any(reply.ok for reply in found):  # the end of the time is a reply, too
+                self._answer_within_s = ANSWER_WITHIN_S
+            else:
                 self._call_soon(self._found_nothing, port, looks_left)
 
         answers = zenoh.handlers.Callback(found.append, ended, indirect=False)
-        self._session.liveliness().get(KEY_OF_HUB, answers, timeout=ANSWER_WITHIN_S)
+        self._session.liveliness().get(KEY_OF_HUB, answers, timeout=self._answer_within_s)
 
     def _found_nothing(self, port: int, looks_left: int) -> None:
         if port not in self._next_look:  # this connection has ended
@@ -85,4 +89,5 @@ class Links:
             self._look_later(port, looks_left)
         else:
             log.warning("the link from port %d to the hub passes no messages, so it is made anew", port)
+            self._answer_within_s = min(2 * self._answer_within_s, SLOWEST_ANSWER_S)
             shut_down(port)

@@ -74,8 +74,12 @@ async def test_a_link_without_messages_is_replaced_until_messages_pass(shared: b
 
 
 @asynccontextmanager
-async def a_deaf_connection_first(hub_port: int) -> AsyncIterator[tuple[int, asyncio.Event]]:
-    """Give a port through which a hub is reached, and what makes the first connection pass keep-alives only."""
+async def a_deaf_connection_first(hub_port: int, delay_s: float = 0.0) -> AsyncIterator[tuple[int, asyncio.Event]]:
+    """Give a port through which a hub is reached, and what makes the first connection pass keep-alives only.
+
+    Args:
+        delay_s: Of each message on its way.
+    """
     is_deaf, streams, tasks = asyncio.Event(), list[asyncio.StreamWriter](), set[asyncio.Task[None]]()
 
     async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, may_be_deaf: bool) -> None:
@@ -84,7 +88,7 @@ async def a_deaf_connection_first(hub_port: int) -> AsyncIterator[tuple[int, asy
                 length = await reader.readexactly(2)
                 batch = await reader.readexactly(int.from_bytes(length, "little"))
                 if len(batch) <= LONGEST_KEEP_ALIVE or not (may_be_deaf and is_deaf.is_set()):
-                    writer.write(length + batch)
+                    asyncio.get_running_loop().call_later(delay_s, writer.write, length + batch)
         except (asyncio.IncompleteReadError, ConnectionError):
             writer.close()
 
@@ -153,3 +157,18 @@ async def test_a_link_to_a_hub_stays() -> None:
     finally:
         await bus.close()
         await hub.close()
+
+
+async def test_a_link_with_a_long_round_trip_stays_after_some_attempts() -> None:
+    endpoint, clock = free_endpoint(), MissionClock.started_now()
+    hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
+    delay_s = 1.5 * zenoh_links.ANSWER_WITHIN_S
+    async with a_deaf_connection_first(int(endpoint.rpartition(":")[2]), delay_s) as (port, _):
+        bus = await ZenohBus.open_when_up(MISSION, CLIENT, clock, client_config(f"tcp/127.0.0.1:{port}"))
+        try:
+            async with asyncio.timeout(NOTICED_WITHIN_S):
+                while await changes(bus, 2, within_s=10 * delay_s) != [True]:
+                    pass  # its round trip was taken for deafness
+        finally:
+            await bus.close()
+    await hub.close()
