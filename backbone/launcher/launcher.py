@@ -45,6 +45,7 @@ from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
+from backbone.launcher.preconditions import has_address
 from backbone.launcher.tree_keeper import TreeKeeper
 from backbone.launcher.wish_keeper import WishKeeper
 from backbone.mission.behavior_orders import behavior_orders, last_order
@@ -98,7 +99,7 @@ class Launcher(Component[NoParameters]):
         self._recorder = recorder
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
-        self._others = OtherHosts(description, clock.now_s(), options.record)
+        self._others = OtherHosts(description, clock.now_s(), options.record, has_address)
         self._wishes = WishKeeper(self, description, self._others, self._newest)
         self._tree = TreeKeeper(
             bus,

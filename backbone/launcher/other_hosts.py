@@ -7,14 +7,19 @@ manager runs the command on a missing machine.
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+
+import msgspec
 
 from backbone.authentication import SECRET_NAME, tcp_endpoint
 from backbone.component.messages import Absence
 from backbone.creator.messages import creator_name, offer_name
 from backbone.mission.model import Host, MissionDescription
 from backbone.naming import Subsystem, address
+
+ADDRESS_BACK = "Give that machine its address again, or take the mission down and write the new one into its file."
 
 
 def endpoint_for_others(description: MissionDescription) -> str:
@@ -48,9 +53,17 @@ class OtherHosts:
     Args:
         now_s: Mission time since which they count as missing.
         record: Recording of the mission on its first host; None: it is not recorded.
+        has_address: Returns whether this machine still has the address of this host, the mission's first one.
     """
 
-    def __init__(self, description: MissionDescription, now_s: float, record: Path | None = None) -> None:
+    def __init__(
+        self,
+        description: MissionDescription,
+        now_s: float,
+        record: Path | None = None,
+        has_address: Callable[[Host], bool] = lambda _host: True,
+    ) -> None:
+        self._first, self._has_address = description.hosts[0], has_address
         self._commands = {host.name: command_on(host, description, record) for host in description.other_hosts}
         self.names = list(self._commands)
         """Names of all other machines, in the order of the mission file."""
@@ -99,8 +112,12 @@ class OtherHosts:
 
     def absences(self) -> list[Absence]:
         """Return the machines that are missing, with the remedy for each."""
-        return [
+        missing = [
             Absence(host, absent.since_s, absent.cause, "waits for its creator", f"type there: {command}")
             for host, command in self._commands.items()
             if (absent := self._absent.get(host)) is not None
         ]
+        if not missing or self._has_address(self._first):
+            return missing
+        cause = f"{self._first.name} does not have the address {self._first.address} any more"
+        return [msgspec.structs.replace(one, cause=cause, remedy=ADDRESS_BACK) for one in missing]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 from pathlib import Path
 
@@ -78,6 +79,18 @@ def prepare_endpoint(description: MissionDescription, directory: Path) -> str:
         _refuse_taken_port(description.hosts[0])
         keep_secret(directory, new_secret())
     return endpoint
+
+
+def has_address(host: Host) -> bool:
+    """Return whether this machine has the host's address; True also for a name, which may mean any address."""
+    try:
+        found = socket.getaddrinfo(host.address, 0, type=socket.SOCK_DGRAM, flags=socket.AI_NUMERICHOST)
+        family, kind, protocol, _, where = found[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.bind(where)
+    except OSError as error:
+        return error.errno != errno.EADDRNOTAVAIL
+    return True
 
 
 def _refuse_taken_port(host: Host) -> None:

@@ -13,6 +13,7 @@ from backbone.command_line.cli import app
 from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
 from backbone.launcher.awaited_hosts import announce_awaited_hosts, awaited_hosts
 from backbone.launcher.other_hosts import OtherHosts, command_on, endpoint_for_others
+from backbone.launcher.preconditions import has_address
 from backbone.mission.model import Host, MissionDescription
 from backbone.picture.health import HealthWord, health
 from backbone.waiting import end_tasks
@@ -79,6 +80,25 @@ def test_the_end_of_a_mission_waits_for_a_host_while_it_may_run_components_and_s
         await end_tasks(saying)
 
     run_virtual(main())
+
+
+def test_a_machine_is_not_told_to_come_to_an_address_that_the_hub_has_lost() -> None:
+    lost: list[str] = []
+    others = OtherHosts(mission(BASE, FAR), 0.0, has_address=lambda host: host.address not in lost)
+    assert "--connect tcp/192.0.2.1:7447" in others.absences()[0].remedy
+    lost.append(BASE.address)
+    [far] = others.absences()
+    assert far.cause == "base does not have the address 192.0.2.1 any more"
+    assert "write the new one into its file" in far.remedy
+    others.token_changed("backbone/creator-far", True, 1.0)
+    assert others.absences() == []
+
+
+@pytest.mark.parametrize(
+    ("where", "is_here"), [("127.0.0.1", True), ("192.0.2.1", False), ("::1", True), ("attic.example.org", True)]
+)
+def test_an_address_is_this_machines_if_it_can_be_used_here(where: str, is_here: bool) -> None:
+    assert has_address(Host(name="base", address=where)) is is_here
 
 
 def test_a_missing_machine_degrades_the_mission() -> None:
