@@ -70,4 +70,4 @@ def _spoken_of(name: str) -> re.Pattern[str]:
 
 def feedback_of(bug: BaseException) -> str:
     """Return a bug as one printable line of a component's feedback; any program can write its text."""
-    return printable(f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH])
+    return printable(" ".join(f"{type(bug).__name__}: {bug}".split())[:MAX_FEEDBACK_LENGTH])

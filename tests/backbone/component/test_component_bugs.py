@@ -258,6 +258,23 @@ def test_a_long_complaint_is_cut_in_the_feedback() -> None:
     live(law())
 
 
+def test_a_refusal_of_several_lines_is_one_line_in_feedback_and_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """A refused start quotes a log; its line ends stood in the log of its parent as backslash and n."""
+
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        stage.walker.fail(TooSteep("watch: exit code 1\nTraceback:\n  no map", remedy="Mend it."))
+        with pytest.raises(TooSteep):
+            await life
+        assert stage.states[-1].feedback == "TooSteep: watch: exit code 1 (Mend it.) Traceback: no map"
+
+    live(law())
+    assert "walker failed: TooSteep: watch: exit code 1 (Mend it.) Traceback: no map" in caplog.text
+
+
 def test_a_bug_that_quotes_a_lone_surrogate_is_the_one_that_is_told() -> None:
     async def law() -> None:
         stage = Stage(hold="serve")
