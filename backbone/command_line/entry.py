@@ -10,6 +10,7 @@ from __future__ import annotations
 import _thread
 import signal
 import sys
+from contextlib import suppress
 from importlib import import_module
 from types import FrameType
 
@@ -56,6 +57,7 @@ def interrupt_again(dropped: sys.UnraisableHookArgs) -> None:
     Another thread sends it: sent by this one, its exception would be raised in here and dropped, too.
     """
     if issubclass(dropped.exc_type, KeyboardInterrupt):
-        _thread.start_new_thread(signal.pthread_kill, (_thread.get_ident(), signal.SIGINT))
+        with suppress(RuntimeError):  # the program ends already: Python 3.12 then begins no thread
+            _thread.start_new_thread(signal.pthread_kill, (_thread.get_ident(), signal.SIGINT))
     else:
         sys.__unraisablehook__(dropped)

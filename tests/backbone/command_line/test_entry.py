@@ -54,6 +54,15 @@ def main():
 sys.modules["ui_console.cli"] = sys.modules["__main__"]
 entry.scout_console()
 """
+ENDING = """
+import atexit, signal, sys
+from backbone.command_line import entry
+
+def main(): atexit.register(signal.raise_signal, signal.SIGINT)
+
+sys.modules["ui_console.cli"] = sys.modules["__main__"]
+entry.scout_console()
+"""
 LOOP = """
 import asyncio, signal, sys
 from backbone.command_line import entry
@@ -98,6 +107,11 @@ def test_an_interrupt_of_which_a_library_makes_another_exception_ends_the_progra
     done = ended(WRAPPED, tmp_path, "--interrupted")
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
     assert "ValueError: of a library" in ended(WRAPPED, tmp_path).stderr
+
+
+def test_an_interrupt_while_the_program_ends_prints_nothing(tmp_path: Path) -> None:
+    done = ended(ENDING, tmp_path)
+    assert (done.stdout, done.stderr) == ("", "")
 
 
 def test_an_interrupt_ends_an_event_loop_in_good_order(tmp_path: Path) -> None:
