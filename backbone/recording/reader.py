@@ -7,11 +7,12 @@ import math
 import os
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import IO, Any
 
 import msgspec
 from mcap.exceptions import McapError
@@ -28,10 +29,9 @@ from backbone.recording.writer import ABOUT, NS, PROFILE
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES
 
 MOST_RECORD_BYTES = 2 * MAX_LARGE_MESSAGE_BYTES  # chosen: a whole chunk fits; a damaged length asks for terabytes
-ROOM = 20  # chosen: twice the calls from a command's loop over messages to the encoder of JSON
+MOST_LEVELS = 850  # chosen: Python's limit of 1000 calls, less six times the calls that lead to its loop
 NOTHING_OF_ONE = "Name a recording; this file has nothing of one."
 DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
-Decoded = TypeVar("Decoded")
 _MAGIC = b"\x89MCAP0\r\n"  # MCAP specification: the begin of every file
 _END = struct.Struct("<BQQQI8x")  # MCAP specification, op 0x02 and the magic: the end of every whole file
 
@@ -347,9 +347,18 @@ def heard_now(key: str, message: Translated, at_s: float) -> Recorded:
     return Recorded(key, message.source, message.schema, at_s, **msgspec.json.decode(message.data))
 
 
-def _with_room(decode: Callable[[bytes], Decoded], data: bytes, room: int = ROOM) -> Decoded:
-    """Return what was decoded; raise ``RecursionError`` also if it could not be encoded again a few calls deeper."""
-    return _with_room(decode, data, room - 1) if room else decode(data)
+def _decoded(data: bytes) -> Any:
+    """Return the value of a JSON text; raise ``RecursionError`` if a call for each of its levels would be too much.
+
+    From Python 3.12 on, the decoder has a limit of its own, which is higher than that of calls.
+    """
+    value = msgspec.json.decode(data)
+    levels, inside = 0, [value] if data.count(b"[") + data.count(b"{") > MOST_LEVELS else []
+    while inside := [one for one in inside if isinstance(one, dict | list)]:
+        if (levels := levels + 1) > MOST_LEVELS:
+            raise RecursionError(f"more than {MOST_LEVELS} values inside each other")
+        inside = [*chain.from_iterable(one.values() if isinstance(one, dict) else one for one in inside)]
+    return value
 
 
 def _recorded(channel: Channel, message: Message) -> Recorded:
@@ -358,7 +367,7 @@ def _recorded(channel: Channel, message: Message) -> Recorded:
     if channel.message_encoding != "json":
         return Recorded(key, source, schema, at_s, at_s, at_s, message.sequence, "", message.data)
     try:
-        said = _with_room(msgspec.json.decode, message.data)
+        said = _decoded(message.data)
     except RecursionError:
         return Recorded(key, source, "", at_s, at_s, at_s, message.sequence, "", message.data)
     try:
