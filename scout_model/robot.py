@@ -15,7 +15,7 @@ from typing import Protocol, cast, runtime_checkable
 from scout_model.battery import Battery
 from scout_model.errors import InvalidWorld
 
-_PARTS = ("body_mjcf", "frequency", "motors", "hear", "controls", "counts")
+_PARTS = ("body_mjcf", "frequency", "motors", "hear", "controls")
 _CLASS_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -40,13 +40,10 @@ class Robot(Protocol):
         """Load of its motors, 0 to 1; they disturb its own picture."""
 
     def hear(self, payload: bytes, now_s: float) -> None:
-        """Obey one packet; ignore and count it if it is malformed."""
+        """Obey one packet; ignore it if it is malformed."""
 
     def controls(self, now_s: float) -> Mapping[str, float]:
         """Advance to this time; return actuator → control. If all controls are zero, the robot may stand still."""
-
-    def counts(self) -> Mapping[str, int]:
-        """Return the counts since power-on, by name."""
 
 
 @runtime_checkable

@@ -15,7 +15,6 @@ Source: IROS 2001, section 2: the on-board processors do communications and actu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from enum import StrEnum
 from importlib import resources
 from typing import NamedTuple, assert_never
@@ -79,23 +78,6 @@ class Actuation(NamedTuple):
     winch_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class FirmwareStatistics:
-    """Counts since the robot was switched on.
-
-    Attributes:
-        heard: Packets obeyed.
-        malformed: Packets ignored because they were malformed.
-        refused_jumps: Jumps refused because the spring was not wound.
-        timeouts: How often the watchdog stopped wheels or transmitter.
-    """
-
-    heard: int
-    malformed: int
-    refused_jumps: int
-    timeouts: int
-
-
 def clip_wheel_speed(speed_rad_s: float) -> float:
     """Return the wheel speed clipped to the motor's limit.
 
@@ -137,18 +119,14 @@ class Firmware:
     def __init__(self) -> None:
         self._left_rad_s = self._right_rad_s = 0.0
         self._heard_s = 0.0
+        self._is_asked = False
         self.spring = Spring.WOUND
         """Phase of the spring foot's jump."""
         self._spring_since_s = 0.0
         self._let_out_m = 0.0
-        self._heard = self._malformed = self._refused_jumps = self._timeouts = 0
-
-    def statistics(self) -> FirmwareStatistics:
-        """Return the counts so far."""
-        return FirmwareStatistics(self._heard, self._malformed, self._refused_jumps, self._timeouts)
 
     def hear(self, payload: bytes, now_s: float) -> None:
-        """Obey one packet; ignore and count it if it is malformed.
+        """Obey one packet; ignore it if it is malformed.
 
         Args:
             payload: As ``scout_model.radio_link`` encodes it.
@@ -157,10 +135,8 @@ class Firmware:
         try:
             packet = decode(payload)
         except MalformedPacket:
-            self._malformed += 1
             return
-        self._heard += 1
-        self._heard_s = now_s
+        self._heard_s, self._is_asked = now_s, True
         match packet:
             case DrivePacket(left_rad_s, right_rad_s):
                 self._left_rad_s, self._right_rad_s = clip_wheel_speed(left_rad_s), clip_wheel_speed(right_rad_s)
@@ -181,7 +157,6 @@ class Firmware:
         """Advance watchdog and jump to this time and return the actuator controls."""
         is_active = self._left_rad_s or self._right_rad_s or self.frequency or self.spring is Spring.PRELOADING
         if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
-            self._timeouts += 1
             self._safe(now_s)
         winch_m = self._advance_spring(now_s)
         return Actuation(self._left_rad_s, self._right_rad_s, self.spring is Spring.KICKING, winch_m)
@@ -197,7 +172,6 @@ class Firmware:
 
     def _jump(self, now_s: float) -> None:
         if self.spring is not Spring.WOUND:
-            self._refused_jumps += 1
             return
         # A body that rolls while its foot is on the floor trips over the foot.
         self._left_rad_s = self._right_rad_s = 0.0
@@ -250,7 +224,6 @@ class Scout(Firmware):
         self._load = 0.0
         self._draws: tuple[float, bool] | None = None
         self._actuation = Actuation(0.0, 0.0, kick=False, winch_m=0.0)
-        self._answered = 0
 
     @classmethod
     def body_mjcf(cls) -> str:
@@ -275,9 +248,9 @@ class Scout(Firmware):
 
     def reply(self, now_s: float) -> bytes:
         """Return charge, tilt and load as a packet; empty if the Scout obeyed no packet since its last reply."""
-        if self._answered == self._heard or self.battery.is_empty(now_s):
+        if not self._is_asked or self.battery.is_empty(now_s):
             return b""
-        self._answered = self._heard
+        self._is_asked = False
         return encode_reply(ScoutReply(self.battery.share(now_s), self._inclinometer.tilt_rad(now_s), self._load))
 
     def controls(self, now_s: float) -> dict[str, float]:
@@ -296,7 +269,3 @@ class Scout(Firmware):
             "kick": float(self._actuation.kick),
             "winch": self._actuation.winch_m,
         }
-
-    def counts(self) -> dict[str, int]:
-        """Return the firmware's statistics by name."""
-        return asdict(self.statistics())

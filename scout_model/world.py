@@ -23,7 +23,7 @@ from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.readings import Senses, parts_by_robot
 from scout_model.robot import AnsweringRobot, Robot, answering, fit_battery, robot_class
-from scout_model.scout import FirmwareStatistics, Scout, Spring
+from scout_model.scout import Scout, Spring
 from scout_model.stability import Stability
 from scout_model.targets import Route, TargetState, part_poses, parts
 
@@ -274,14 +274,6 @@ class World:
             UnknownBody: No Scout has this name.
         """
         return self._scout(robot).spring
-
-    def firmware_statistics(self, robot: str) -> FirmwareStatistics:
-        """Return the counts of a Scout's firmware.
-
-        Raises:
-            UnknownBody: No Scout has this name.
-        """
-        return self._scout(robot).statistics()
 
     def _robot(self, name: str) -> _Body:
         robot = self._robots.get(name)

@@ -14,7 +14,6 @@ class Rover:
     def __init__(self) -> None:
         self._speeds_rad_s = (0.0, 0.0)
         self._frequency = ""
-        self._heard = 0
 
     @classmethod
     def body_mjcf(cls) -> str:
@@ -56,7 +55,6 @@ class Rover:
             packet = radio_link.decode(payload)
         except MalformedPacket:
             return
-        self._heard += 1
         match packet:
             case radio_link.DrivePacket(left_rad_s, right_rad_s):
                 self._speeds_rad_s = left_rad_s, right_rad_s
@@ -71,9 +69,6 @@ class Rover:
 
     def controls(self, now_s: float) -> dict[str, float]:
         return dict(zip(("left", "right"), self._speeds_rad_s, strict=True))
-
-    def counts(self) -> dict[str, int]:
-        return {"heard": self._heard}
 
 
 class Driverless(Rover):

@@ -36,7 +36,6 @@ class PanCamera:
     def __init__(self) -> None:
         self._asked_rad = self._pan_rad = 0.0
         self._heard_s = self._now_s = 0.0
-        self._heard = self._malformed = self._timeouts = 0
 
     @classmethod
     def body_mjcf(cls) -> str:
@@ -49,28 +48,22 @@ class PanCamera:
         return float(self._asked_rad != self._pan_rad)
 
     def hear(self, payload: bytes, now_s: float) -> None:
-        """Obey one packet; ignore and count it if it is malformed."""
+        """Obey one packet; ignore it if it is malformed."""
         try:
             self._obey(payload)
         except (MalformedPacket, struct.error):
-            self._malformed += 1
-        else:
-            self._heard, self._heard_s = self._heard + 1, now_s
+            return
+        self._heard_s = now_s
 
     def controls(self, now_s: float) -> dict[str, float]:
         """Advance to this time and return the target angle of the pan motor."""
         past_s, self._now_s = now_s - self._now_s, now_s
         if (self.motors or self.frequency) and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
-            self._timeouts += 1
             self._stop()
             self.frequency = ""
         most_rad = PAN_RAD_S * past_s
         self._pan_rad += max(-most_rad, min(most_rad, self._asked_rad - self._pan_rad))
         return {"pan": self._pan_rad}
-
-    def counts(self) -> dict[str, int]:
-        """Return the numbers of packets obeyed, packets ignored and stops by the watchdog."""
-        return {"heard": self._heard, "malformed": self._malformed, "timeouts": self._timeouts}
 
     def _obey(self, payload: bytes) -> None:
         if payload[:1] == b"L":

@@ -84,7 +84,7 @@ class Rover:
         self._readings: Mapping[str, Sequence[float]] = _FELT_NOTHING
         self._is_blocked = False
         self._heard_s = self._now_s = 0.0
-        self._heard = self._malformed = self._timeouts = self._reflexes = self._answered = 0
+        self._is_asked = False
 
     @classmethod
     def body_mjcf(cls) -> str:
@@ -97,16 +97,14 @@ class Rover:
         return min(1.0, max(abs(self._forward_m_s) / TOP_M_S, abs(self._turn_rad_s) / TOP_RAD_S))
 
     def hear(self, payload: bytes, now_s: float) -> None:
-        """Obey one packet of ``link``; ignore and count it if it is malformed."""
+        """Obey one packet of ``link``; ignore it if it is malformed."""
         if self.battery.is_empty(now_s):
             return
         try:
             packet = decode(payload)
         except MalformedPacket:
-            self._malformed += 1
             return
-        self._heard += 1
-        self._heard_s = now_s
+        self._heard_s, self._is_asked = now_s, True
         match packet:
             case MovePacket(forward_m_s, turn_rad_s):
                 self._ask(MovePacket(_clip(forward_m_s, TOP_M_S), _clip(turn_rad_s, TOP_RAD_S)))
@@ -151,19 +149,10 @@ class Rover:
 
     def reply(self, now_s: float) -> bytes:
         """Return the rover's state as a packet; empty if it obeyed no packet since its last answer."""
-        if self._answered == self._heard or self.battery.is_empty(now_s):
+        if not self._is_asked or self.battery.is_empty(now_s):
             return b""
-        self._answered = self._heard
+        self._is_asked = False
         return encode_reply(self._state(now_s))
-
-    def counts(self) -> dict[str, int]:
-        """Return the numbers of packets obeyed and ignored, and of stops by watchdog and reflex."""
-        return {
-            "heard": self._heard,
-            "malformed": self._malformed,
-            "timeouts": self._timeouts,
-            "reflexes": self._reflexes,
-        }
 
     def _ask(self, asked: MovePacket) -> None:
         self._asked = asked
@@ -178,14 +167,12 @@ class Rover:
     def _watch(self, now_s: float) -> None:
         is_active = self._asked != _STAND or self.frequency
         if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
-            self._timeouts += 1
             self._asked, self.frequency = _STAND, ""
 
     def _brake_at_bumpers(self) -> None:
         is_pressed = any(self._readings[bumper][0] > 0.0 for bumper in _FRONT_BUMPERS)
         if is_pressed and not self._is_blocked and max(self._forward_m_s, self._asked.forward_m_s) > 0.0:
             self._is_blocked = True
-            self._reflexes += 1
         if self._is_blocked:
             self._forward_m_s = min(0.0, self._forward_m_s)
 

@@ -54,25 +54,18 @@ class Walker:
         self._turn_rad_s = 0.0
         self._joints_rad = STANDING
         self._on_floor = (False,) * len(LEGS)
-        self._heard = self._malformed = self._timeouts = 0
 
     @classmethod
     def body_mjcf(cls) -> str:
         """Return the body; see ``scout_model.robot.Robot``."""
         return resources.files("resource_pool.robots.walker").joinpath("body.xml").read_text(encoding="utf-8")
 
-    def counts(self) -> dict[str, int]:
-        """Return the numbers of packets obeyed, malformed packets and interventions of the watchdog."""
-        return {"heard": self._heard, "malformed": self._malformed, "timeouts": self._timeouts}
-
     def hear(self, payload: bytes, now_s: float) -> None:
-        """Obey one packet; ignore and count it if it is malformed."""
+        """Obey one packet; ignore it if it is malformed."""
         try:
             packet = link.decode(payload)
         except MalformedPacket:
-            self._malformed += 1
             return
-        self._heard += 1
         self._heard_s = now_s
         match packet:
             case JointTargets(targets_rad, within_s):
@@ -93,7 +86,6 @@ class Walker:
         """Advance to this time and return the servos' targets by actuator."""
         is_active = self._targets_rad != STANDING or self.frequency
         if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
-            self._timeouts += 1
             self._stand(now_s)
             self.frequency = ""
         if now_s > self._ticked_s:

@@ -158,7 +158,7 @@ def test_a_body_that_lacks_a_method_is_refused(
     with pytest.raises(MissionInvalid) as caught:
         world_of(tmp_path, text)
     told = {fault.message for fault in caught.value.faults}
-    assert told == {f"{name}:Body is no kind of robot: it lacks body_mjcf, controls, counts"}
+    assert told == {f"{name}:Body is no kind of robot: it lacks body_mjcf, controls"}
 
 
 @pytest.mark.parametrize(

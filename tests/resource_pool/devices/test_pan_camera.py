@@ -161,12 +161,11 @@ def test_silence_stops_it_and_its_transmitter() -> None:
     camera.hear(encode_look(2.0), 0.0)
     looks_rad = run_for(camera, 0.0, 2.0)
     assert looks_rad == pytest.approx(PAN_RAD_S * COMMAND_TIMEOUT_S, abs=0.05)
-    assert (camera.frequency, camera.counts()["timeouts"]) == ("", 1)
+    assert camera.frequency == ""
 
 
 @pytest.mark.parametrize("payload", [b"", b"L", encode_look(3.0), encode_look(math.nan), b"J", b"noise"])
-def test_what_is_no_packet_of_its_own_is_counted_and_changes_nothing(payload: bytes) -> None:
+def test_what_is_no_packet_of_its_own_changes_nothing(payload: bytes) -> None:
     camera = PanCamera()
     camera.hear(payload, 0.0)
-    assert camera.counts() == {"heard": 0, "malformed": 1, "timeouts": 0}
     assert camera.controls(0.1) == {"pan": 0.0}

@@ -111,7 +111,6 @@ def test_silence_stops_wheels_and_transmitter_and_keeps_the_grip() -> None:
     still = driven.frame()
     assert still == {"left_wheel": 0.0, "right_wheel": 0.0, "paddles": held["paddles"], "lift": held["lift"]}
     assert driven.rover.frequency == ""
-    assert driven.rover.counts()["timeouts"] == 1
 
 
 def test_noise_does_not_keep_it_driving() -> None:
@@ -121,7 +120,6 @@ def test_noise_does_not_keep_it_driving() -> None:
         driven.rover.hear(b"noise", driven.now_s)
         driven.frame()
     assert driven.speed() == (0.0, 0.0)
-    assert driven.rover.counts()["malformed"] == 30
 
 
 def test_a_stop_stops_wheels_paddles_and_lift_where_they_are() -> None:
@@ -154,13 +152,12 @@ def test_a_bumper_in_front_stops_it_until_something_else_than_forward_is_asked(b
     assert driven.go(1.0, MovePacket(-0.3, 0.0))[0] == -0.3
     assert not driven.told().is_blocked
     assert driven.go(1.0, MovePacket(0.3, 0.0))[0] == 0.3
-    assert driven.rover.counts()["reflexes"] == 1
 
 
 def test_pressed_while_it_stands_or_from_behind_it_is_free_to_back_off_and_to_go() -> None:
     driven = Driven()
     driven.go(0.5, left_tip=PRESSED)
-    assert driven.rover.counts()["reflexes"] == 0
+    assert not driven.told().is_blocked
     assert driven.go(1.0, MovePacket(-0.3, 0.0))[0] == -0.3
     assert driven.go(2.0, MovePacket(0.5, 0.0), left_tip=FREE, rear_bumper=PRESSED)[0] == 0.5
     assert driven.told().bumpers == link.Bumpers(front=False, left_tip=False, right_tip=False, rear=True)
@@ -222,7 +219,5 @@ def test_with_an_empty_battery_it_stands_silent_and_keeps_its_grip() -> None:
     assert driven.speed() == (0.0, 0.0)
     assert driven.rover.frequency == ""
     assert driven.frame()["paddles"] == body.PADDLES_M
-    heard = driven.rover.counts()["heard"]
     driven.rover.hear(link.encode(MovePacket(0.5, 0.0)), driven.now_s)
-    assert driven.rover.counts()["heard"] == heard
     assert driven.rover.reply(driven.now_s) == b""

@@ -83,7 +83,6 @@ def test_halt_safe_and_silence_let_it_stand(packet: bytes | None) -> None:
     walker = Walker()
     walker.hear(link.encode_joint_targets(JointTargets(AWAY, 0.0)), 0.0)
     assert ticks(walker, 0, 3)[-1] == pytest.approx(AWAY)
-    assert walker.counts() == {"heard": 1, "malformed": 0, "timeouts": 0}
     silent = int(COMMAND_TIMEOUT_S * FRAMES_PER_S)
     if packet is not None:
         walker.hear(packet, 0.1)
@@ -91,7 +90,6 @@ def test_halt_safe_and_silence_let_it_stand(packet: bytes | None) -> None:
     driven = ticks(walker, 3, silent + 12)
     assert driven[-1] == (0.0,) * 12
     assert walker.motors == 0.0
-    assert walker.counts()["timeouts"] == int(packet is None)
 
 
 def test_it_holds_its_targets_until_silence_is_long_enough() -> None:
@@ -112,16 +110,15 @@ def test_its_transmitter_obeys_and_goes_off_with_safe_and_silence() -> None:
     walker.hear(radio_link.encode_transmitter_on("video3"), 0.4)
     walker.controls(0.4 + COMMAND_TIMEOUT_S)
     assert walker.frequency == ""
-    assert walker.counts()["timeouts"] == 1
 
 
-def test_malformed_packets_are_counted_and_do_not_feed_the_watchdog() -> None:
+def test_malformed_packets_do_not_feed_the_watchdog() -> None:
     walker = Walker()
     walker.hear(link.encode_joint_targets(JointTargets(AWAY, 0.0)), 0.0)
     for tick in range(30):
         walker.hear(b"noise", tick / FRAMES_PER_S)
-        walker.controls(tick / FRAMES_PER_S)
-    assert walker.counts() == {"heard": 1, "malformed": 30, "timeouts": 1}
+        driven = walker.controls(tick / FRAMES_PER_S)
+    assert set(driven.values()) == {0.0}
 
 
 def readings(attitude: tuple[float, float, float, float], turn_rad_s: float = 0.0) -> dict[str, list[float]]:

@@ -97,7 +97,6 @@ def test_silence_in_the_middle_of_a_stride_lets_it_stand() -> None:
     silent.packets = lambda now_s: []  # type: ignore[method-assign]
     walked = trial.walk(silent, 2.0)
     assert not walked.fell
-    assert trial.walker.counts()["timeouts"] == 1
     status = walked.statuses[-1]
     assert max(map(abs, status.joints_rad)) < 0.05
     assert all(status.on_floor)
