@@ -145,7 +145,6 @@ class ArcClient:
         self._bus, self._listener, self._not_now = bus, listener, not_now
         self._granted, self._suspended = asyncio.Event(), asyncio.Event()
         self._suspended.set()
-        self._frames: Subscription | None = None
         self._stops = StopKnowledge()
 
     async def keep(

@@ -29,7 +29,7 @@ class Checkpoints:
     """
 
     def __init__(self, classes: Mapping[str, type[Message]], most: int = MOST) -> None:
-        self._classes, self._most = classes, most
+        self._most = most
         self._times_s = [-math.inf]
         self._missions = [RecordedMission(classes)]
 

@@ -340,20 +340,6 @@ class ExecutionUnit:
         self._seats = [pair.new if seat is pair.old else seat for seat in self._seats]
         self._fresh = self._fresh_inputs()
 
-    def reset(self, start_s: float) -> None:
-        """Reset modules, inputs and statistics to the beginning, and end any exchange."""
-        if self._exchanging is not None:
-            self._exchanging.exchange.fail(start_s, "its unit began anew")
-            self._end_exchange(self._exchanging)
-        for slot in self._slots.values():
-            slot.value, slot.number = None, 0
-        for seat in self._seats:
-            seat.times = ModuleTimes()
-            seat.module.reset()
-            for one in seat.inputs:
-                one.seen = 0
-        self._begin(start_s)
-
     def statistics(self, now_s: float = 0.0) -> UnitStatistics:
         """Return the unit's statistics.
 

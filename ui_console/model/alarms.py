@@ -63,8 +63,6 @@ class AlarmBook:
         self._beside = beside
         self._own_away_since_s = NONE_S
         self._now_s = NONE_S
-        self.forgotten = 0
-        """Number of alarms dropped because the book was full."""
 
     @property
     def away_since_s(self) -> float:
@@ -189,8 +187,6 @@ class AlarmBook:
             return is_unseen, alarm.is_active
 
         alarm = self._alarms.pop(min(self._alarms, key=weight))  # of equal alarms the first, because it is the oldest
-        if self._is_shown(alarm) and not alarm.acknowledged_by:
-            self.forgotten += 1
         self._over.discard(alarm.key)
 
 

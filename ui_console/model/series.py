@@ -28,8 +28,6 @@ class Series:
         self._part_s = span_s / PARTS
         self._parts: dict[int, Extent] = {}
         self._last = -math.inf
-        self.newest: float | None = None
-        """The last number; None: no number yet."""
 
     def __len__(self) -> int:
         return len(self._parts)
@@ -44,7 +42,7 @@ class Series:
         before = self._parts.get(part, Extent(number, number))
         self._parts[part] = Extent(min(before.least, number), max(before.most, number))
         if part >= self._last:
-            self._last, self.newest = part, number
+            self._last = part
             for old in [one for one in self._parts if one <= part - PARTS]:
                 del self._parts[old]
 

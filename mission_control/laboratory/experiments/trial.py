@@ -46,8 +46,6 @@ class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         number: Number of the trial, from 0.
         detected: True if a watcher published motion while the target was in its view.
-        detected_s: Time of the first such picture after the target's departure, seconds; -1: no detection.
-        seen_by: Scout that detected it; empty: none.
         false_alarms: Number of motion events published while the target was not in the watcher's view.
         switches: Grants and ends of holds compared with the transmitters.
         disagreements: Disagreements, one line each.
@@ -59,8 +57,6 @@ class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     number: int
     detected: bool
-    detected_s: float
-    seen_by: str
     false_alarms: int
     switches: int
     disagreements: list[str]
@@ -215,14 +211,12 @@ class _Trial:
     def _judge(self, trace: list[Line], world: dict[str, float], over_s: float) -> Trial:
         frequencies = [f"video{channel}" for channel in range(1, self._condition.channels + 1)]
         agreed = agreement(trace, self._samples, self._condition.robots, frequencies, over_s)
-        true = [(since_s, robot) for since_s, robot, is_true in self._seen if is_true]
+        true = sum(is_true for _since_s, _robot, is_true in self._seen)
         everything = json.dumps([trace, self._seen], sort_keys=True)
         return Trial(
             number=self._number,
-            detected=bool(true),
-            detected_s=round(true[0][0], 6) if true else -1.0,
-            seen_by=true[0][1] if true else "",
-            false_alarms=len(self._seen) - len(true),
+            detected=true > 0,
+            false_alarms=len(self._seen) - true,
             switches=agreed.switches,
             disagreements=list(agreed.broken),
             jammed_frames=agreed.jammed + int(world["jammed_frames"]),

@@ -39,7 +39,7 @@ class Watcher:
     """Compares wanted components with running ones, and with the published health, until cancelled."""
 
     def __init__(self, shape: SupervisedShape, machines: Machines, audit: Audit, clock: Clock) -> None:
-        self._machines, self._audit, self._clock, self._shape = machines, audit, clock, shape
+        self._machines, self._audit, self._clock = machines, audit, clock
         nodes = list(walk(shape.trees))
         self._core = ["nameserver", *(name for name in CORE if name != "creator"), *map(creator_name, shape.hosts)]
         self._wanted = [

@@ -353,17 +353,6 @@ def test_the_answer_can_be_sent_although_the_round_is_older_than_the_request() -
     assert Reader(Swapped).read(sent).body == told
 
 
-def test_a_reset_ends_an_exchange() -> None:
-    unit, exchange = unit_of(Tally()), begun()
-    unit.exchange(WantedExchange(GRAPH, "tally", Tally(), exchange, lambda _outputs: None))
-    unit.put("number", Number(1.0))
-    unit.run(0.0)
-    unit.reset(0.0)
-    assert exchange.cause == "its unit began anew"
-    unit.put("number", Number(1.0))
-    assert [value for _key, value in unit.run(0.0)] == [("old", 1, 1.0)]
-
-
 def test_the_new_one_does_not_get_what_the_old_one_has_had() -> None:
     unit, new, exchange = unit_of(Tally()), Tally(), begun()
     unit.put("number", Number(1.0))

@@ -87,7 +87,6 @@ def test_a_plot_has_the_least_and_most_number_of_the_span_at_any_width(
     assert extent == (min(kept), max(kept))
     columns = [one for one in series.columns(now_s, count) if one is not None]
     assert (min(one.least for one in columns), max(one.most for one in columns)) == extent
-    assert series.newest == samples[-1][1]
     assert len(series) <= SERIES_PARTS
 
 
@@ -111,7 +110,6 @@ def test_what_is_no_number_and_what_is_too_old_is_not_plotted() -> None:
     for at_s, number in ((100.0, 1.0), (100.0, float("nan")), (101.0, float("inf")), (100.0 - 2 * SPAN_S, 5.0)):
         series.add(at_s, number)
     assert series.extent(101.0) == (1.0, 1.0)
-    assert series.newest == 1.0
 
 
 @given(BODIES)

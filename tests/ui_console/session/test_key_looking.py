@@ -129,7 +129,7 @@ def test_a_recorded_key_is_shown_with_its_past_and_goes_on_as_it_is_played() -> 
         assert series.extent(90.0) == (31.0, 90.0)
         playback.play(10.0)
         await asyncio.sleep(1.05)
-        assert (view.at_s, series.newest) == (100.0, 100.0)
+        assert (view.at_s, series.extent(100.0)) == (100.0, (41.0, 100.0))
         await end_tasks(looking)
 
     run_virtual(scene())
