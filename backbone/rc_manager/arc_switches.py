@@ -4,27 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine, Iterable
-from typing import Protocol
 
-from backbone.bus.interface import Clock
 from backbone.rc_manager.context_switch import ContextSwitch
 from backbone.rc_manager.failures import Failures
-from backbone.rc_manager.rc_watch import RcWatch
+from backbone.rc_manager.rc_watch import RcWatch, Service
 from backbone.rc_manager.switch_times import SwitchTimes
-from backbone.scheduling.events import ConnectArc, Event, Freed, Opened, OpenFailed, RevokeArc
+from backbone.scheduling.events import ConnectArc, Freed, Opened, OpenFailed, RevokeArc
 from backbone.waiting import end_tasks
-
-
-class SwitchService(Protocol):
-    """The interface of the RC manager for its switches."""
-
-    clock: Clock
-
-    def happened(self, event: Event) -> None:
-        """Pass the event to the schedule manager, and carry out its instructions."""
-
-    def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
-        """Run the coroutine until the component ends."""
 
 
 class ArcSwitches:
@@ -39,7 +25,7 @@ class ArcSwitches:
     """
 
     def __init__(
-        self, service: SwitchService, failures: Failures, context_switch: ContextSwitch, rcs: RcWatch, grace_s: float
+        self, service: Service, failures: Failures, context_switch: ContextSwitch, rcs: RcWatch, grace_s: float
     ) -> None:
         self._service, self._failures, self._context_switch = service, failures, context_switch
         self._rcs, self._grace_s = rcs, grace_s

@@ -6,16 +6,14 @@ import asyncio
 import contextlib
 import logging
 from collections import defaultdict
-from collections.abc import Coroutine, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import msgspec
 
-from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.messages import Absence
-from backbone.component.story import StoryBook
 from backbone.errors import LinkError, Refusal
 from backbone.rc_manager.arc_switches import ArcSwitches
 from backbone.rc_manager.beats import Beats
@@ -33,8 +31,9 @@ from backbone.rc_manager.messages import (
     TakePath,
     Withdraw,
 )
+from backbone.rc_manager.rc_watch import Service
 from backbone.rc_manager.recovery import Recovery
-from backbone.scheduling.events import Departed, Event
+from backbone.scheduling.events import Departed
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest
 from backbone.scheduling.run_times import can_be_planned
@@ -58,24 +57,14 @@ class Choosing:
     request: SchedulingRequest | None
 
 
-class ArcService(Protocol):
+class ArcService(Service, Protocol):
     """The interface of the RC manager for this watch."""
-
-    bus: Bus
-    clock: Clock
-    story: StoryBook
-
-    def happened(self, event: Event) -> None:
-        """Pass the event to the schedule manager, and carry out its instructions."""
 
     async def request(self, request: SchedulingRequest) -> Scheduled:
         """Choose RCs for the request, and admit it."""
 
     def admit_again(self, current: CurrentRequest) -> bool:
         """Admit a request with the RCs chosen for it earlier, unless an RC of them is gone."""
-
-    def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
-        """Run the coroutine until the component ends."""
 
 
 class ArcWatch:

@@ -40,7 +40,7 @@ MEET_LATEST_S = 16.0  # chosen: meanwhile an ARC preempted for a vain connection
 
 
 class Service(Protocol):
-    """The interface of the RC manager for this watch."""
+    """The interface of the RC manager for its parts."""
 
     launch: Launch
     bus: Bus
@@ -64,7 +64,7 @@ class Service(Protocol):
     def publish_event(self, subject: str, what: str, level: LogLevel) -> None:
         """Publish an event about the subject to the mission's log."""
 
-    def start_task(self, work: Coroutine[object, None, None], name: str) -> object:
+    def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         """Run the coroutine until the component ends."""
 
 
