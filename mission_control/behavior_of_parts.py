@@ -6,9 +6,7 @@ import asyncio
 from collections.abc import Coroutine, Mapping, Sequence
 from typing import Protocol
 
-from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import LogLevel
-from backbone.component.story import StoryBook
+from backbone.component.component_of_parts import ComponentOfParts
 from backbone.mission.behavior_orders import PathStep
 from mission_control.behavior_tree import BehaviorNode
 from mission_control.children import Decision
@@ -16,26 +14,15 @@ from mission_control.gated_bus import GatedBus
 from mission_control.messages import BehaviorStatus
 
 
-class BehaviorOfParts(Protocol):
+class BehaviorOfParts(ComponentOfParts, Protocol):
     """A behavior, as its parts see it; see ``BehaviorHooks`` for its decisions."""
 
-    bus: Bus
     gate: GatedBus
-    clock: Clock
-    story: StoryBook
     status: BehaviorStatus
     feedback: str
     payload: dict[str, object]
     child_nodes: dict[str, BehaviorNode]
     """Name of a child → its present node."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def address(self) -> str:
-        """Its address."""
 
     @property
     def path(self) -> Sequence[PathStep]:
@@ -51,15 +38,6 @@ class BehaviorOfParts(Protocol):
 
     def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
         """Run work as a task, unless the behavior is ending."""
-
-    def report(self, feedback: str) -> None:
-        """Set the feedback."""
-
-    def changed(self) -> None:
-        """Note that ``absences`` may have changed."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
-        """Add an event to the story and to the mission's log."""
 
     def suspension_changed(self) -> None:
         """Called when the reason of its suspension may have changed."""

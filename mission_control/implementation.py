@@ -11,8 +11,8 @@ from typing import ClassVar, Protocol, Self
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.component_of_parts import ComponentOfParts
 from backbone.component.launch import Launch
-from backbone.component.log_level import LogLevel
 from backbone.component.messages import WrongParameter
 from backbone.errors import complaint
 from backbone.exchange import NotExchanged, SwapClass
@@ -24,14 +24,12 @@ from mission_control.gated_bus import GatedBus
 from mission_control.messages import BehaviorStatus
 
 
-class Implementation(Protocol):
+class Implementation(ComponentOfParts, Protocol):
     """The interface of a behavior that its exchange needs."""
 
     accepts: ClassVar[Accepts | None]
     parameters_type: ClassVar[type[msgspec.Struct]]
-    launch: Launch
     gate: GatedBus
-    clock: Clock
     status: BehaviorStatus
     child_nodes: dict[str, BehaviorNode]
     has_begun: bool
@@ -48,12 +46,6 @@ class Implementation(Protocol):
 
     async def run(self) -> None:
         """Run."""
-
-    def end(self, reason: str) -> None:
-        """End in good order."""
-
-    def fail(self, bug: BaseException) -> None:
-        """End because of a bug."""
 
     def is_ready(self) -> bool:
         """Return whether it can take charge."""
@@ -72,12 +64,6 @@ class Implementation(Protocol):
 
     def stand_by(self) -> None:
         """Send no more commands."""
-
-    def report(self, feedback: str) -> None:
-        """Set the feedback."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = ...) -> None:
-        """Publish an event."""
 
 
 Load = Callable[[str], type[Implementation]]

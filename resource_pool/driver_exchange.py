@@ -20,7 +20,7 @@ from typing import ClassVar, Protocol
 
 import msgspec
 
-from backbone.bus.interface import Bus, Clock
+from backbone.component.component_of_parts import ComponentOfParts
 from backbone.component.log_level import LogLevel
 from backbone.component.messages import WrongParameter
 from backbone.errors import Refusal, complaint
@@ -50,18 +50,12 @@ CLOSES_WITHIN_S = 2.0  # chosen: a device that does not close by then hangs; mac
 RESTORES_WITHIN_S = 2.0  # chosen: as for a close, from the time on at which only one driver is left; machine seconds
 
 
-class RcOfDrivers(Protocol):
+class RcOfDrivers(ComponentOfParts, Protocol):
     """The interface of the RC that a driver exchange needs."""
 
-    bus: Bus
-    clock: Clock
     driver_kind: ClassVar[str]
     driver_field: ClassVar[str]
     closed_most_s: ClassVar[float]
-
-    @property
-    def name(self) -> str:
-        """Its name."""
 
     @property
     def parameters(self) -> msgspec.Struct:
@@ -78,12 +72,6 @@ class RcOfDrivers(Protocol):
 
     def has_driver(self, parameters: msgspec.Struct) -> None:
         """Apply the parameters with another driver."""
-
-    def fail(self, bug: BaseException) -> None:
-        """End because of a bug."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = ...) -> None:
-        """Publish an event."""
 
 
 @dataclass(slots=True)

@@ -14,8 +14,8 @@ import logging
 from collections.abc import Awaitable, Sequence
 from typing import Protocol, TypeVar
 
+from backbone.component.component_of_parts import ComponentOfParts
 from backbone.component.messages import LogLevel
-from backbone.component.story import StoryBook
 from backbone.errors import LinkError, Refusal, complaint
 from backbone.waiting import only_bugs
 from resource_pool.drivers.interface import HardwareFault
@@ -30,27 +30,13 @@ FAULTS = (Refusal, LinkError, TimeoutError)
 """Of a hook of a hold: the hardware, or a component that the hook asked, does not obey. All others are bugs."""
 
 
-class RcOfHolds(Protocol):
+class RcOfHolds(ComponentOfParts, Protocol):
     """The interface of the RC that ``HoldEnds`` needs."""
 
     holds: HoldTable
-    story: StoryBook
-
-    @property
-    def name(self) -> str:
-        """Its name."""
 
     async def make_safe(self, hold: Hold) -> None:
         """Bring the resource of this hold into its safe state."""
-
-    def report(self, feedback: str) -> None:
-        """Set the feedback."""
-
-    def changed(self) -> None:
-        """Note that the published state may have changed."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = ...) -> None:
-        """Publish an event."""
 
 
 class HoldEnds:

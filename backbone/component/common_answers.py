@@ -11,8 +11,7 @@ from typing import ClassVar, Protocol
 import msgspec
 
 from backbone.bus.clock import VirtualClock
-from backbone.bus.interface import Bus, Clock
-from backbone.component.launch import Launch
+from backbone.component.component_of_parts import ComponentOfParts
 from backbone.component.messages import (
     MESSAGES_DROPPED,
     PROCESSOR_S,
@@ -35,20 +34,15 @@ from backbone.component.messages import (
     WrongParameter,
 )
 from backbone.component.parameter_values import parameters_from
-from backbone.component.story import StoryBook
 from backbone.errors import Refusal, complaint
 from backbone.ranges import LONGEST_MENTION, MOST_ENTRIES, MOST_MEASURE
 from backbone.spoken import value_text
 from backbone.wire import Envelope, Message
 
 
-class Answering(Protocol):
+class Answering(ComponentOfParts, Protocol):
     """The component that is asked; see ``Component``."""
 
-    launch: Launch
-    bus: Bus
-    clock: Clock
-    story: StoryBook
     fixed: ClassVar[frozenset[str]]
 
     @property
@@ -63,15 +57,6 @@ class Answering(Protocol):
 
     def change_parameters(self, changed: Mapping[str, object]) -> None:
         """Replace the values of these parameters."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
-        """Add an event to the story, and publish it to the mission's log."""
-
-    def end(self, reason: str) -> None:
-        """End in good order."""
-
-    def fail(self, bug: BaseException) -> None:
-        """End because of a bug."""
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer a question of its own."""

@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
+from backbone.component.component_of_parts import ComponentOfParts
 from backbone.component.log_level import LogLevel
 from backbone.errors import Refusal
 
 MOST_LOGGED = 16  # chosen: more than a correct mission has; garbage on thousands of keys does not fill the log
-
-
-class Logging(Protocol):
-    """The part of a component that this module needs."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
-        """Add an event to the story, and publish it to the mission's log."""
 
 
 class UnreadableKeys:
@@ -28,7 +16,7 @@ class UnreadableKeys:
         component: The component, whose story gets the warnings.
     """
 
-    def __init__(self, component: Logging) -> None:
+    def __init__(self, component: ComponentOfParts) -> None:
         self._component = component
         self._logged: set[str] = set()
 

@@ -9,14 +9,12 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Coroutine, Iterable
+from collections.abc import Iterable
 from typing import Protocol
 
 from backbone.addresses import PLACER
-from backbone.bus.interface import Bus, Clock
-from backbone.component.launch import Launch
+from backbone.component.component_of_parts import ComponentOfParts
 from backbone.component.messages import Absence, LogLevel, NameTaken
-from backbone.component.story import StoryBook
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
 from backbone.placer.messages import Start, Started
@@ -39,13 +37,9 @@ REMEDY = "examine its hardware; 'scout-backbone story {name}' shows its failures
 MEET_LATEST_S = 16.0  # chosen: meanwhile an ARC preempted for a vain connection gets some of the papers' 5 s slices
 
 
-class Service(Protocol):
+class Service(ComponentOfParts, Protocol):
     """The interface of the RC manager for its parts."""
 
-    launch: Launch
-    bus: Bus
-    clock: Clock
-    story: StoryBook
     manager: ScheduleManager
     shares: Shares
 
@@ -57,15 +51,6 @@ class Service(Protocol):
 
     def is_choosing(self) -> bool:
         """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
-
-    def changed(self) -> None:
-        """Publish news soon."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel) -> None:
-        """Publish an event about the subject to the mission's log."""
-
-    def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
-        """Run the coroutine until the component ends."""
 
 
 class RcWatch:

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol, assert_never
 
-from backbone.bus.interface import Bus, Clock
+from backbone.component.component_of_parts import ComponentOfParts
 from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.mission_log.operators import OperatorAction
 from resource_pool.arc_client import OtherStop, Stopper, StopState
@@ -28,23 +28,14 @@ ANSWER_TIME_S = CONSENT_WITHIN_S + 1.0  # chosen: longer than the time-out at th
 LOOK_AGAIN = "Look who stopped the robot and why, then lift that stop if it may move."
 
 
-class Speaks(Protocol):
+class Speaks(ComponentOfParts, Protocol):
     """The interface of the console through which a stop is lifted.
 
     Attributes:
-        bus: Bus to other consoles.
-        clock: The mission's clock.
         feed: Knows robots and consoles.
-        address: Address of this console.
     """
 
-    bus: Bus
-    clock: Clock
     feed: ConsoleFeed
-
-    @property
-    def address(self) -> str:
-        """Address of this console."""
 
     def acted(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
         """Publish the operator's action."""
