@@ -43,7 +43,6 @@ BARE_KEY = "bare/frames"
 WIDTH_PX, HEIGHT_PX, RATE_HZ = 320, 240, 30.0
 TURN_S, REST_S = 1.0, 0.1  # chosen: a turn of each way, and a rest longer than any picture of the other way takes
 WARM_UP = 10_000_000  # first number of the pictures that are not counted
-READY_S = 30.0
 ROS1_US = {1: (562, 660), 4: (828, 777), 16: (1882, 1606)}
 """Listeners → p50 of ROS 1, and of bare zenoh with shared memory beside it, for the same pictures.
 
