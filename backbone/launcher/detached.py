@@ -17,7 +17,7 @@ from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.errors import LinkError, NoResponder, Refusal
+from backbone.errors import LinkError, NoResponder, Refusal, ReplyTimeout
 from backbone.launcher.bring_up import end_mission
 from backbone.launcher.core_launches import UpOptions
 from backbone.launcher.ending_messages import AwaitLastBranch, AwaitMissionEnd, LastBranchOver, MissionEnded
@@ -166,14 +166,13 @@ async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool)
 
 
 async def _needed(bus: Bus, ended: asyncio.Event) -> str:
-    """Return what was needed to end the components, for people.
-
-    Raises:
-        ReplyTimeout: They have not ended within ``ASKED_S``.
-    """
+    """Return what was needed to end the components, for people; empty: they have not ended within ``ASKED_S``."""
     asking = asyncio.create_task(bus.ask(LAUNCHER, AwaitMissionEnd(), MissionEnded, within_s=ASKED_S))
     await first_of(asking, ended.wait())
     if not asking.cancelled():
+        if isinstance(asking.exception(), ReplyTimeout):
+            say(f"not all components have ended within {ASKED_S:g} s")
+            return ""
         with contextlib.suppress(NoResponder, Refusal):  # it died, or it is of another release
             return with_signals(asking.result().signaled) or "asking was enough"
     return "it is unknown whether its components needed a signal"

@@ -11,7 +11,7 @@ import pytest
 
 from backbone import run_files
 from backbone.creator.messages import EndedBy, ProcessEnded
-from backbone.errors import HubUnreachable, NoResponder, ReplyTimeout
+from backbone.errors import HubUnreachable, LinkError, NoResponder, ReplyTimeout
 from backbone.launcher import detached
 from backbone.launcher.ending_messages import EndMission, MissionEnded, MissionEnding
 from backbone.run_files import RunFile
@@ -79,17 +79,21 @@ def test_a_launcher_of_another_release_is_ended_by_a_signal(
 
 KILLED = ProcessEnded("spin", EndedBy.SIGKILL, 0)
 ACCOUNTS = [
-    (MissionEnded([]), "asking was enough"),
-    (MissionEnded([KILLED]), "needed a signal to end: spin (sigkill)"),
-    (NoResponder("it fell"), "it is unknown whether its components needed a signal"),
-    (MissionEnding(has_components=False), "asking was enough"),
+    (MissionEnded([]), "mission m is down; asking was enough"),
+    (MissionEnded([KILLED]), "mission m is down; needed a signal to end: spin (sigkill)"),
+    (NoResponder("it fell"), "mission m is down; it is unknown whether its components needed a signal"),
+    (MissionEnding(has_components=False), "mission m is down; asking was enough"),
+    (
+        ReplyTimeout("no answer within 20 s"),
+        "not all components have ended within 20 s\nmission m is down; SIGTERM was enough",
+    ),
 ]
 
 
 @pytest.mark.parametrize("answer_s", [0.0, 5.0], ids=["", "full machine"])
 @pytest.mark.parametrize(("account", "words"), ACCOUNTS)
 def test_the_last_line_says_what_the_components_needed(
-    account: MissionEnded | MissionEnding | NoResponder,
+    account: MissionEnded | MissionEnding | LinkError,
     words: str,
     answer_s: float,
     monkeypatch: pytest.MonkeyPatch,
@@ -112,7 +116,7 @@ def test_the_last_line_says_what_the_components_needed(
                 if isinstance(question, EndMission) and not isinstance(account, MissionEnding):
                     return MissionEnding()
                 launcher.terminate()
-                if isinstance(account, NoResponder):
+                if isinstance(account, LinkError):
                     raise account
                 return account
 
@@ -122,4 +126,4 @@ def test_the_last_line_says_what_the_components_needed(
         monkeypatch.setattr(detached, "ZenohBus", Ending)
         monkeypatch.setattr(run_files, "find", lambda _mission: found)
         assert asyncio.run(detached.take_down("m")) == 0
-    assert capsys.readouterr().err == f"mission m is down; {words}\n"
+    assert capsys.readouterr().err == f"{words}\n"
