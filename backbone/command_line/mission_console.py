@@ -42,6 +42,7 @@ from backbone.wire import Envelope
 
 EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
 PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start takes less
+SAME_EVERY_S = 60.0  # chosen: a wait for a person at another machine may last hours
 REPLY_TIME_S = 2.0  # chosen: the RC manager answers in milliseconds
 SWITCH_S = 0.1  # chosen: the decisions of one switch become one line; a person sees no delay
 ENDS_WITHIN_S = 1.0  # chosen: a terminal that reads takes the last lines at once
@@ -70,6 +71,7 @@ class ConsoleObserver:
         self._picture = MissionPicture("")
         self._told = self._health_told = ""
         self._is_up, self._last_progress_s = False, 0.0
+        self._waits_for: list[str] = []
 
     def began(self, step: str) -> None:
         """Print nothing, because ``Outcome.failure`` names a step that hangs."""
@@ -152,9 +154,13 @@ class ConsoleObserver:
             self._print(f"{'':9}    {line}")
 
     def _heard_while_coming_up(self, heard: MissionHealth, at_s: float) -> None:
-        """From time to time print the components that a long start waits for."""
-        if at_s - self._last_progress_s >= PROGRESS_EVERY_S:
-            self._last_progress_s = at_s
+        """Print what a long start waits for: when it changes, and the same more and more seldom."""
+        waits_for = [absence.name for absence in heard.absent]
+        again_s = PROGRESS_EVERY_S
+        if waits_for == self._waits_for:
+            again_s = max(PROGRESS_EVERY_S, min(self._last_progress_s, SAME_EVERY_S))
+        if at_s - self._last_progress_s >= again_s:
+            self._last_progress_s, self._waits_for = at_s, waits_for
             for line in heard.lines(at_s):
                 self.tell(f"  … {line}")
 

@@ -53,3 +53,23 @@ def test_sixty_components_that_start_are_one_line() -> None:
     run_virtual(scene())
     [line] = lines.getvalue().splitlines()
     assert line.startswith("  … each of 60 components (radio0, ")
+
+
+def test_a_long_wait_is_told_less_and_less_often() -> None:
+    lines = io.StringIO()
+
+    async def scene() -> None:
+        clock, network = VirtualClock(), LocalNetwork("lines")
+        ConsoleObserver(Console(file=lines), live=False).connected(network.join("backbone/up", clock))
+        launcher = network.join("backbone/launcher", clock)
+        for second in range(1, 400):
+            await clock.sleep_s(1.0)
+            missing = [
+                Absence(host, 0.0, "no creator yet", "waits") for host in ("far", "farther")[: 1 + (second > 299)]
+            ]
+            launcher.publish("backbone/launcher", Conversation.HEALTH, MissionHealth(HealthWord.STARTING, missing))
+
+    run_virtual(scene())
+    told = [line for line in lines.getvalue().splitlines() if "farther" not in line]
+    assert 8 <= len(told) <= 14
+    assert "farther is absent for 300.0 s" in lines.getvalue()
