@@ -19,6 +19,15 @@ READY_WITHIN_S = 10.0  # as in exchange
 SILENT_S = 1.0  # as in exchange
 
 
+def class_path_of(value: str) -> str:
+    """Refuse a text that is no class path."""
+    from backbone.mission.class_paths import CLASS_PATH
+
+    if CLASS_PATH.fullmatch(value) is None:
+        raise typer.BadParameter(f"{value!r} is no class; write package.module:Class")
+    return value
+
+
 @AtMission
 def swap(
     where: Where,
@@ -31,7 +40,10 @@ def swap(
         ),
     ],
     class_path: Annotated[
-        str, typer.Argument(metavar="PACKAGE.MODULE:CLASS", help="Its new class; the file is read anew.")
+        str,
+        typer.Argument(
+            metavar="PACKAGE.MODULE:CLASS", callback=class_path_of, help="Its new class; the file is read anew."
+        ),
     ],
     parameter: Annotated[
         list[str] | None,
