@@ -67,7 +67,7 @@ class TerminalDriver(LinuxDriver):
     only the keys of the emergency stop have. The screen gets a ``KeysDropped`` then.
     """
 
-    _is_reading = False
+    _is_drawing = False
     _read_s = math.inf
 
     def __init__(
@@ -87,16 +87,16 @@ class TerminalDriver(LinuxDriver):
         After SIGSTOP and SIGCONT, end first what no handler has ended: of two threads that read keys, one would wait
         for a key for ever, and the end of the screen for that thread.
         """
-        if self._is_reading:
+        if self._is_drawing:
             self._must_signal_resume = True
             self.suspend_application_mode()
         self._output.drops = False
         super().start_application_mode()  # type: ignore[no-untyped-call]  # Textual declares no types here
-        self._output.drops = True
+        self._output.drops = self._is_drawing = True
 
     def stop_application_mode(self) -> None:
         """Stop drawing and reading, and restore the terminal."""
-        self._output.drops = False
+        self._output.drops = self._is_drawing = False
         super().stop_application_mode()
 
     def close(self) -> None:
@@ -111,11 +111,7 @@ class TerminalDriver(LinuxDriver):
 
     def run_input_thread(self) -> None:
         """Read keys until the screen ends."""
-        self._is_reading = True
-        try:
-            self._read()
-        finally:
-            self._is_reading = False
+        self._read()
 
     def _draw_anew(self) -> None:
         with suppress(RuntimeError):  # the event loop has ended

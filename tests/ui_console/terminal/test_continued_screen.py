@@ -33,9 +33,19 @@ Screen().run()
 """
 
 
+READS_LATE = """
+import time
+from ui_console.terminal.driver import TerminalDriver
+
+read = TerminalDriver.run_input_thread
+TerminalDriver.run_input_thread = lambda self: (time.sleep(0.3), read(self))
+"""
+
+
+@pytest.mark.parametrize("before", ["", READS_LATE], ids=["", "before it reads"])
 @pytest.mark.parametrize("stop", rest_thorough([signal.SIGSTOP, signal.SIGTSTP]))
-def test_a_screen_that_was_stopped_and_continued_reads_keys_and_ends(stop: signal.Signals) -> None:
-    with screen_on_a_terminal(PROGRAM) as played:
+def test_a_screen_that_was_stopped_and_continued_reads_keys_and_ends(stop: signal.Signals, before: str) -> None:
+    with screen_on_a_terminal(before + PROGRAM) as played:
         played.wait_shown(b"BEGUN")
         played.screen.send_signal(stop)
         os.waitid(os.P_PID, played.screen.pid, os.WSTOPPED | os.WNOWAIT)
