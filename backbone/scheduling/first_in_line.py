@@ -133,7 +133,8 @@ class FirstInLine:
         first = None if self._by_time else self.at(rc)
         if first is None or first in joined:
             return False
-        others = [user for user in self._state.users[rc] if user.queued and user not in joined]
+        new = set(joined)  # after a restart of the RC manager all ARCs join at once
+        others = [user for user in self._state.users[rc] if user.queued and user not in new]
         return self._table.first_in_order([user for user in others if self._table.usable(user)]) is first
 
     def takes_from_others(self, arc: ArcEntry, holders: Sequence[ArcEntry], now_s: float) -> bool:

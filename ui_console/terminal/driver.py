@@ -111,13 +111,6 @@ class TerminalDriver(LinuxDriver):
 
     def run_input_thread(self) -> None:
         """Read keys until the screen ends."""
-        self._read()
-
-    def _draw_anew(self) -> None:
-        with suppress(RuntimeError):  # the event loop has ended
-            self._loop.call_soon_threadsafe(self._app.refresh)
-
-    def _read(self) -> None:
         self._read_s = min(self._read_s, time.monotonic())  # after a stop, the last time before it
         decode = getincrementaldecoder("utf-8")("replace").decode
         parser = KnownKeys()
@@ -143,6 +136,10 @@ class TerminalDriver(LinuxDriver):
                     dropped += not self._passed_on(event, is_late=is_late)
                 if dropped:
                     self.process_message(KeysDropped())
+
+    def _draw_anew(self) -> None:
+        with suppress(RuntimeError):  # the event loop has ended
+            self._loop.call_soon_threadsafe(self._app.refresh)
 
     def _passed_on(self, event: Message, *, is_late: bool) -> bool:
         is_stop = isinstance(event, Key) and event.key in STOPPING
