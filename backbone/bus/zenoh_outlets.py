@@ -121,7 +121,8 @@ class Outlet:
             self._raise_token()
         if len(raw) > self.quality.most_bytes:
             if not board.is_open:
-                refuse_oversized(len(raw), self.quality.most_bytes, type(envelope.body).__name__)
+                what = f"without a board on this host, {type(envelope.body).__name__}"
+                refuse_oversized(len(raw), self.quality.most_bytes, what)
             self._watch_missed(len(raw), now_s)
             return
         if is_heard:

@@ -32,7 +32,7 @@ def test_nonsense_of_a_reader_ends_that_reader_alone(folder: Path, descriptors: 
     writer.close()
 
 
-@pytest.mark.parametrize("seal", [0, 2])  # none; F_SEAL_SHRINK alone
+@pytest.mark.parametrize("seal", [0, 2, 7, 8, 16])  # none; F_SEAL_SHRINK alone; all but writing; writing alone
 def test_memory_that_could_change_is_refused(folder: Path, descriptors: Count, seal: int) -> None:
     memory = os.memfd_create("bad", os.MFD_ALLOW_SEALING)
     os.write(memory, bytes(100))

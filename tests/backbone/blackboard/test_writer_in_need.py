@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import fcntl
+import os
 import socket
 import threading
 import time
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from taking import WITHIN_S, Count
+from taking import WITHIN_S, Count, taken
 
 from backbone.blackboard import sealed_memory
 from backbone.blackboard import writer as writers
 from backbone.blackboard.reader import BlackboardReader
 from backbone.blackboard.sealed_memory import Waits
+from backbone.blackboard.values import MOST_IN_PACKET
 from backbone.blackboard.writer import BlackboardWriter
 
 
@@ -111,3 +115,38 @@ def test_a_writer_that_could_not_be_opened_leaves_its_place_and_no_descriptor(
             BlackboardWriter(folder, "room")
     assert descriptors() == before
     BlackboardWriter(folder, "room").close()
+
+
+def test_a_value_is_sealed_while_the_system_still_uses_its_pages(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As when the system moves or scans them: here a pipe refers to one."""
+    write, (waiting, entry) = os.pwrite, os.pipe()
+
+    def write_and_use(descriptor: int, value: bytes, at: int) -> int:
+        written = write(descriptor, value, at)
+        assert os.splice(descriptor, entry, 4096, offset_src=0) == 4096
+        return written
+
+    monkeypatch.setattr(os, "pwrite", write_and_use)
+    writer, value = BlackboardWriter(folder, "room"), bytes(2 * MOST_IN_PACKET)
+    try:
+        assert writer.put(value) == 1
+        with closing(BlackboardReader(folder, "room")) as reader:
+            writer.serve()
+            assert bytes(taken(reader).data) == value
+    finally:
+        writer.close()
+        os.close(waiting)
+        os.close(entry)
+
+
+def test_a_value_is_sealed_by_an_older_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of 2018, which knows no seal against future writers only."""
+    ask = fcntl.fcntl
+
+    def refuse(descriptor: int, command: int, seals: int = 0) -> int:
+        if command == fcntl.F_ADD_SEALS and seals & 0x10:
+            raise OSError(errno.EINVAL, "unknown seal")
+        return ask(descriptor, command, seals)
+
+    monkeypatch.setattr(fcntl, "fcntl", refuse)
+    assert bytes(sealed_memory.mapped(sealed_memory.sealed(b"value"), 5)) == b"value"
