@@ -70,6 +70,14 @@ def test_a_test_that_fails_says_what_the_mission_said_and_leaves_nothing(real_mi
     assert psutil.wait_procs(processes, timeout=10)[1] == []
 
 
+def test_a_command_that_is_not_over_in_time_says_what_the_mission_said(real_mission: BringUp) -> None:
+    with (
+        real_mission(EXAMPLES / "smallest.xml") as running,
+        pytest.raises(AssertionError, match=r"timed out after 0\.5 seconds(.|\n)*--- up said(.|\n)*all ready"),
+    ):
+        running.command("scout-console", "monitor", "--json", "--mission", running.name, within_s=0.5)
+
+
 def test_a_mission_that_is_refused_says_why(real_mission: BringUp) -> None:
     with pytest.raises(AssertionError, match="no line '\\^all ready'") as failed, real_mission("<mission/>"):
         pass

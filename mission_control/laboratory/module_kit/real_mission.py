@@ -78,16 +78,23 @@ class RealMission:
     def command(
         self, *words: str, within_s: float = 60.0, stdin: str | None = None
     ) -> subprocess.CompletedProcess[str]:
-        """Run ``scout-backbone`` or ``scout-console`` with these arguments against the mission."""
-        return subprocess.run(  # noqa: S603  our own command lines
-            [str(BIN / words[0]), *words[1:]],
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=within_s,
-            input=stdin,
-            check=False,
-        )
+        """Run ``scout-backbone`` or ``scout-console`` with these arguments against the mission.
+
+        Raises:
+            AssertionError: It was not over in time; with what it had printed and the mission's story.
+        """
+        try:
+            return subprocess.run(  # noqa: S603  our own command lines
+                [str(BIN / words[0]), *words[1:]],
+                env=self.environment,
+                capture_output=True,
+                text=True,
+                timeout=within_s,
+                input=stdin,
+                check=False,
+            )
+        except subprocess.TimeoutExpired as late:
+            raise AssertionError(f"{late}\n{late.stdout!r}\n{late.stderr!r}\n{self.story()}") from None
 
     def status(self) -> JsonObject:
         """Return what ``status --json`` prints."""
