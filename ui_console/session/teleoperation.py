@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import ClassVar
 
 import msgspec
@@ -28,22 +28,22 @@ from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import AskConsent, Consent, WithdrawConsent
 from ui_console.model.driving import Command, GiveWish, Motion
 from ui_console.model.lifting import AskLift
-from ui_console.model.orders import Order
+from ui_console.model.orders import GivenOrder, Order
 from ui_console.session.arc_claim import ArcClaim
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
 from ui_console.session.controls import Controls
 from ui_console.session.hand_over import AskHandOver, HandOver
+from ui_console.session.observer import Observer
 from ui_console.session.order_keeper import OrderKeeper
-from ui_console.session.order_verbs import OrderVerbs
 from ui_console.session.presence import OperatorPresence
 from ui_console.session.waiting import Waiting
 
 log = logging.getLogger(__name__)
 
 
-class Teleoperation(OrderVerbs):
+class Teleoperation(Observer[TeleoperationParameters]):
     """A console that drives a robot.
 
     Args:
@@ -166,6 +166,43 @@ class Teleoperation(OrderVerbs):
         self._presence.touch()
         self._orders.back()
 
+    @property
+    def orders(self) -> Mapping[str, GivenOrder]:
+        """Robot → its order; a final order keeps its robot for the operator until the operator takes it."""
+        return self._orders.orders
+
+    def order(self, order: Order) -> int:
+        """Give a robot an order; return the order's number; see ``order_group``."""
+        return self.order_group([order])[0]
+
+    def order_group(self, orders: Sequence[Order]) -> list[int]:
+        """Give robots orders at the same time; ``OrderChanged`` events show the state of each.
+
+        An order claims its robot with this console's priority, whether the stick holds the robot or not. A held robot
+        stays with the stick until the order's behavior can take it. An earlier order of the robot ends. A held control
+        moves nothing before it is released. A new press, ``take`` and ``interrupt`` end the order of the robot at the
+        stick.
+
+        Args:
+            orders: One order for each robot; an order without a robot is for the robot at the stick.
+
+        Returns:
+            The number of each order, from 1, unique at this console.
+        """
+        self.touch()
+        self.require_let_go()
+        return self._orders.give(orders)
+
+    def interrupt(self) -> None:
+        """End the unfinished order of the robot at the stick, if any; the robot comes to rest."""
+        if self._orders.goes_on(self._robot):
+            self._orders.touched(self._robot)
+
+    async def end_order(self, robot: str) -> None:
+        """Return this robot to the mission, if it has an order; wait until its behavior has released it."""
+        if await self._orders.give_back(robot, f"{self.user} gave it back"):
+            self.acted(OperatorAction.RELEASE, robot, "its order was ended")
+
     def leave(self) -> None:
         """Stop the wheels and ignore held controls, because the operator turned away or the window lost the focus."""
         self._presence.leave()
@@ -253,6 +290,7 @@ class Teleoperation(OrderVerbs):
 
     @property
     def _robot(self) -> str:
+        """The robot at the stick; empty: any, or none."""
         return self.parameters.robot or self._claim.holding
 
     def begin_ask_consent(self, why: str = "") -> None:
