@@ -29,7 +29,6 @@ class Now:
     """The present time.
 
     Attributes:
-        mission_s: Mission time.
         here: Local time of this machine.
     """
 

@@ -30,7 +30,6 @@ def draw(p50_us: Mapping[str, Mapping[int, float]], floors: Mapping[str, str], f
     Args:
         p50_us: Way → size in bytes → latency.
         floors: Way → its floor, which is drawn in the same color.
-        file: File of the picture.
     """
     numbers = {way: number for number, way in enumerate(way for way in NAMES if way not in floors.values())}
     numbers |= {floor: numbers[way] for way, floor in floors.items()}

@@ -73,7 +73,6 @@ class Watch:
     Attributes:
         process: The observer.
         origin_s: Time at which the mission's clock was 0, monotonic clock of the machine.
-        looks: Its looks.
         pictures_s: Arrivals of pictures.
     """
 
@@ -114,8 +113,6 @@ class BenchMission:
     """A mission that is up, and its observations.
 
     Args:
-        running: The mission.
-        watch: The observations of the mission.
         trace: File of its scheduling decisions.
     """
 

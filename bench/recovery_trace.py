@@ -27,7 +27,6 @@ def violations(trace: Path, pauses: Sequence[tuple[float, float]]) -> tuple[list
     Each life of the RC manager is judged by itself; it begins with a ``meta`` line and its adoptions.
 
     Args:
-        trace: The file.
         pauses: Times at which the RC manager's process was stopped and continued.
     """
     lives: list[list[dict[str, Any]]] = []

@@ -23,9 +23,7 @@ class Fault:
     Attributes:
         victim: Its name in this program.
         name: ``SIGKILL``, ``SIGTERM`` or ``SIGSTOP n``.
-        pid: The process.
         rows: Components that live in it, or end with it.
-        at_s: Time of the fault.
         lifted_s: Time at which a stopped process was continued; for others ``at_s``.
         replaced_s: Time at which another process replaced it, if it is not a component; ``math.inf``: not yet.
     """

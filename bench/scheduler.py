@@ -51,9 +51,7 @@ class Measured:
     """The measurements of one size.
 
     Attributes:
-        shape: Shape of the fleet.
         arcs: ARCs in the complete fleet.
-        rcs: RCs in the fleet.
         asked: ARCs that sent a request before the time was over.
         whole: True if the fleet was complete and had run for a while when its decisions were measured.
         build_s: Seconds of deciding until all had sent requests and run for a while.
@@ -107,7 +105,6 @@ def measure(of: Fleet, arcs: int, *, events: int, within_s: float, seed: int) ->
 
     Args:
         of: RCs and a source of requests.
-        arcs: ARCs in the fleet.
         events: Requests and releases to measure, each; slice ends happen meanwhile.
         within_s: Seconds of wall time before giving up; half of it for building the fleet.
         seed: Seed of arrivals and departures.

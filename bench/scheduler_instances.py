@@ -47,7 +47,6 @@ class Stopwatch:
     """A schedule manager with the durations of its decisions.
 
     Attributes:
-        manager: The schedule manager.
         ends_at: ``perf_counter`` value at which the measurement is abandoned.
         times_s: Kind of event → seconds, decision by decision.
     """
@@ -76,7 +75,6 @@ class Fleet:
 
     Attributes:
         shape: A name in ``SHAPES``.
-        rcs: The RCs.
         rng: Source of all random choices.
     """
 

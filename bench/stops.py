@@ -52,8 +52,6 @@ class Runner:
     """Tries cells of one console.
 
     Args:
-        console: The console.
-        world: The world of the mission.
         within_s: Longest legal duration of a stop.
     """
 

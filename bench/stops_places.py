@@ -199,11 +199,9 @@ class Kind:
     """A kind of console.
 
     Attributes:
-        places: Its places.
         gestures: The manners of stop that it has.
         drives: Whether it holds a robot.
         size: Columns and lines of a terminal; (0, 0) for a console without a terminal.
-        words: Words of its command.
     """
 
     places: tuple[Place, ...]

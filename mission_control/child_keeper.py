@@ -41,7 +41,6 @@ class ChildKeeper:
         """Create a keeper without children.
 
         Args:
-            parent: The behavior.
             reported: Called with a child's status, payload and reason of suspension when it finished, cannot run or was
                 adopted.
             left: Called when an order stopped a child.

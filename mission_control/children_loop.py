@@ -30,12 +30,7 @@ class ChildOrder:
 
 
 class ChildrenLoop:
-    """Passes the events of children and the time to the rules, and carries out the answers.
-
-    Args:
-        parent: The behavior.
-        rules: The rules that decide.
-    """
+    """Passes the events of children and the time to the rules, and carries out the answers."""
 
     def __init__(self, parent: BehaviorOfParts, rules: Children) -> None:
         self.rules = rules

@@ -92,7 +92,6 @@ class DebugViews:
     """The views of one behavior. A view exists from its first ``picture`` or ``value`` on, at most ``MOST_VIEWS``.
 
     Args:
-        bus: Of the behavior.
         clock: The mission's.
     """
 

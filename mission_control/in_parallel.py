@@ -14,7 +14,6 @@ class InParallel(Composite):
     """All children at the same time: the numbers of successes and of failures decide.
 
     Args:
-        names: Names of the children.
         success_count: Number of successes for a success; -1: all, -2: all but one, and so on.
         failure_count: Number of failures for a failure; negative as above. The parent also fails as soon as too few
             children are left for a success.

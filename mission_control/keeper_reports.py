@@ -28,8 +28,6 @@ class KeeperReports:
     """Sends the newest report at each change, and regularly.
 
     Args:
-        bus: Bus of the behavior.
-        clock: The mission's clock.
         keeper: Address of the console.
         report: Returns the newest report.
     """

@@ -12,9 +12,6 @@ from mission_control.parent_reports import ParentReports
 class OwnReports:
     """Sends the newest report whenever there is news.
 
-    Args:
-        behavior: The reporting behavior.
-
     Attributes:
         keeper: The reports to the console that ordered the behavior; None: the behavior is a node of the mission's
             tree.

@@ -19,8 +19,6 @@ class ParentReports:
     """Sends the newest report until the parent acknowledges it; older reports that did not arrive are dropped.
 
     Args:
-        bus: Bus of the behavior.
-        clock: The mission's clock.
         parent: Address of the parent.
         report: Returns the newest report.
         begin: Runs work as a task, unless the behavior is ending.

@@ -132,7 +132,6 @@ class ArcClient:
 
         Args:
             bus: Bus of the decision process.
-            arc: Name of the ARC.
             listener: Called at the begin and end of grants.
             not_now: Called shortly before the end of a slice that can be extended, if the ARC was claimed with
                 ``may_say_not_now``: seconds still needed; 0: none.
@@ -163,7 +162,6 @@ class ArcClient:
         If a grant ends with its ARC, the listener gets ``arc_suspended`` with the reason ``lost``.
 
         Args:
-            clock: The mission's clock.
             kind: Component type of the ARC: ``drive``, ``video_drive``, ``capture``.
             parameters: Made by ``claim_parameters``.
             rests: True: the ARC was started with these parameters before and rests. ``keep`` wakes it, and starts it

@@ -24,11 +24,7 @@ START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are starting
 
 
 class KeptArc(Protocol):
-    """Interface of ``ArcClient`` for a keeper.
-
-    Attributes:
-        address: Address of the ARC.
-    """
+    """Interface of ``ArcClient`` for a keeper."""
 
     address: str
 
@@ -55,10 +51,8 @@ class ArcKeeper:
 
         Args:
             bus: Bus of the decision process.
-            arc: Name of the ARC.
             wish: Records that the ARC is missing, and why.
             client: Sends questions to the ARC and applies its state.
-            clock: The mission's clock.
             on_changed: Called when ``wish.absence()`` may have changed.
         """
         self._bus, self._arc, self._wish, self._client = bus, arc, wish, client

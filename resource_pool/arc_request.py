@@ -109,8 +109,6 @@ def request_of(
     """Return the request of the ARC with these parameters.
 
     Args:
-        arc: Name of the ARC.
-        given: Its parameters.
         sets: Sets of RCs that match, each role → name.
         sharable: Names of the sharable RCs, which the ARC uses through packet streams.
         usage: Usage of the radio if the parameters state none.

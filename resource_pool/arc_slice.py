@@ -38,7 +38,6 @@ class ArcSlice:
 
         Args:
             bus: For questions to owner and RC manager.
-            clock: The mission's clock.
             gate: The ARC's gate, which opens with the slice.
             owner: Address of its decision process.
             longest_s: The longest run time that the ARC asks for now, seconds.

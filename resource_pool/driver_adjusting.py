@@ -16,7 +16,6 @@ def adjust_changed(drivers: Sequence[Any], site: DriverSite, former: DriverSite,
     """Have the drivers apply what is changed, if they can; see ``ResourceController.parameters_changed``.
 
     Args:
-        drivers: The drivers of one RC.
         site: With the changed parameters.
         former: With the parameters in force.
         adjustable: Parameters that a driver may change while it runs.
@@ -36,7 +35,6 @@ def _adjust_all(drivers: Sequence[AdjustableDriver], site: DriverSite, former: D
     """Have all drivers apply the parameters of this site.
 
     Args:
-        drivers: The drivers of one RC.
         site: With the changed parameters.
         former: With the parameters in force.
 

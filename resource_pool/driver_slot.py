@@ -48,7 +48,6 @@ class DriverSlot:
 
     Attributes:
         proxy: An object with the driver's methods, and with no other public name, because a driver may use any name.
-        works: The driver that works.
         on_trial: Called with the exception when the working driver fails. Returns None if that driver is not on trial;
             otherwise an event that is set when the old driver works again.
         calls: Calls that were answered.
@@ -60,7 +59,6 @@ class DriverSlot:
         """Pass calls to this driver.
 
         Args:
-            driver: The driver.
             judge: Reads what its methods return.
             again: Called before the old driver repeats an asynchronous call, because time has passed since.
             fail: Called with the hardware fault if a driver that is not on trial delivers a value of no use.

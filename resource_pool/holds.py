@@ -19,7 +19,6 @@ class Hold:
     """One ARC's connection to the RC.
 
     Attributes:
-        epoch: Epoch of the connection.
         lease_until_s: Mission time at which it ends unless renewed.
         use: The ARC's use of the RC.
         companions: The other RCs of the set with their epochs.

@@ -268,7 +268,6 @@ class Localizer(ResourceController[LocalizerParameters]):
         """Return the first belief: the start place, or the saved belief with more uncertainty for missed commands.
 
         Args:
-            name: The robot.
             applied: Number of commands that its RC has applied; None: the RC does not run.
         """
         now_s, before = self.clock.now_s(), self._before

@@ -30,8 +30,6 @@ class OwnerNotices:
         """Create an empty queue.
 
         Args:
-            bus: For the notices.
-            clock: The mission's clock.
             owner: Address of the decision process.
             note: Subject, event → the story.
         """

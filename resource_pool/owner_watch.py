@@ -27,7 +27,6 @@ class OwnerWatch:
 
     Args:
         bus: For questions and heartbeats.
-        clock: The mission's clock.
         owner: Address of the decision process.
         note: Subject, event → the story.
     """

@@ -37,7 +37,6 @@ class Packet:
 
     Attributes:
         arc: The ARC that commands the robot.
-        network_id: Network id of the robot.
         payload: Bytes of the robot's protocol.
         safe_payload: The robot's last packet.
         robot_epoch: Epoch of the robot RC's connection.

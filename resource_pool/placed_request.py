@@ -48,8 +48,6 @@ class PlacedRequest:
 
         Args:
             bus: For the RC manager.
-            clock: The mission's clock.
-            arc: Name of the ARC.
             changed: Changes these parameters of the ARC, so that they show the present request.
             note: Subject, event → the story.
         """

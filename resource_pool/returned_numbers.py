@@ -62,7 +62,6 @@ def applied_values(given: object, what: str, method: Callable[..., object]) -> d
 
     Args:
         what: Word of the command.
-        method: The method.
 
     Raises:
         TypeError: They are not numbers by name, or no message carries so many, or such long names.

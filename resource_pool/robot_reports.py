@@ -44,8 +44,6 @@ class RobotReports:
 
         Args:
             rc: Name of the robot's RC.
-            bus: Of the RC.
-            clock: The mission's clock.
             reader: The robot's protocol; None: the protocol cannot decode replies.
             alarm_share: Charge of the battery below which there is an alarm.
             say: Publishes an event about the robot.

@@ -24,7 +24,6 @@ async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "", clock: C
 
     Args:
         bus: Bus of an operator.
-        robot: The robot.
         reason: For people.
         user: Name of the operator, for people.
         clock: The mission's clock, to repeat the stop for ``REPLY_TIME_S`` while no component answers, because the hub

@@ -19,7 +19,6 @@ class SetLease:
         """Begin without a lease.
 
         Args:
-            arc: Name of the ARC.
             rate: Mission seconds per second of the machine.
         """
         self.until_s = 0.0

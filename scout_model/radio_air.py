@@ -78,7 +78,6 @@ class RadioAir:
         """Put a packet on the air.
 
         Args:
-            sent: The packet.
             away_m: Distance of its robot from the antenna, above 0; None: no robot has the id.
         """
         if away_m is None:

@@ -28,8 +28,6 @@ class Stability:
     """The warnings of one world.
 
     Args:
-        model: Model of the world.
-        data: Its state.
         kinds: Robot → class path.
     """
 

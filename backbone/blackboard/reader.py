@@ -28,7 +28,6 @@ class BlackboardReader:
 
     Args:
         directory: Folder of the boards.
-        name: Name of the board.
         most_bytes: Longest value.
 
     Raises:

@@ -111,7 +111,6 @@ async def change(bus: Bus, name: str, attribute: str, value: object, user: str) 
     Args:
         name: Name of a component, an ARC, a console, or a node of the behavior tree.
         attribute: ``priority``, ``parent``, a run time, or a parameter of the component.
-        value: The new value.
 
     Returns:
         The present values, for people.

@@ -53,7 +53,6 @@ class ConsoleObserver:
     """Shows a mission to a person: lines while it comes up and goes down; meanwhile a live picture or lines.
 
     Args:
-        console: The terminal.
         live: True: a picture that is redrawn; False: lines.
         verdict: Pipe to the command that waits until all is ready; None: no command waits.
         output: Of the terminal or pipe, if it is one.

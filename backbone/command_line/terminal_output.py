@@ -27,7 +27,6 @@ class TerminalOutput:
     Args:
         descriptor: File descriptor of the terminal or pipe.
         caught_up: Called in another thread after texts were dropped: a picture has to be drawn anew.
-        encoding: Of the terminal.
 
     Attributes:
         drops: True: texts are pictures. False: they are lines, or change the terminal's mode.

@@ -56,7 +56,6 @@ def tree_lines(mission: Element, there: Sequence[ComponentState]) -> list[str]:
 
     Args:
         mission: The mission file with all changes of its tree.
-        there: The components of the mission.
     """
     lines = _lines(mission.first("behaviors"), _running(there), "  ")
     return [*map(People(there).named, lines)]

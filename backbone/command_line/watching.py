@@ -203,7 +203,6 @@ async def overhearing(
     """Call ``heard`` with key, message and mission time of each selected message.
 
     Args:
-        clock: The mission's clock.
         keys: Patterns of keys; none: all.
         heard: Called in the event loop.
         classes: Message classes by schema; None: the mission's classes.

@@ -17,7 +17,6 @@ class Where:
     Attributes:
         mission: Name of the mission; None: the one that is up on this machine.
         connect: Endpoint of the hub of a mission elsewhere; such a mission must have a name here.
-        secret_file: File with the secret of that mission.
     """
 
     mission: str | None

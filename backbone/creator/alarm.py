@@ -16,7 +16,6 @@ class Alarm:
         clock: Times are in seconds of the machine.
         task: Runs work under a name; the caller cancels it at the end.
         ring: Called at the time; may set the next one.
-        name: Name of the work.
     """
 
     def __init__(

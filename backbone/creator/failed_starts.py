@@ -72,7 +72,6 @@ def start_failed(name: str, how: str, launch: Launch | None) -> StartFailed:
     """Return why the component did not start: the refusal at the end of its log, or the last lines.
 
     Args:
-        name: The component.
         how: How it ended.
         launch: Its launch; None: it is not known here any more.
     """

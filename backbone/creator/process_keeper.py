@@ -121,7 +121,6 @@ class ProcessKeeper:
         """Start the component and return its pid when it is ready.
 
         Args:
-            policy: Restart policy.
             ready_within_s: Silence, seconds of the machine, after which a start has failed.
             order: Order that ``processes()`` returns; None: made from the other arguments.
 

@@ -26,7 +26,6 @@ def write_copy(recording: Recording, to: IO[bytes], translations: Translations, 
     """Write the copy; return how many of its messages are in well-known schemas.
 
     Args:
-        recording: The recording to copy.
         to: File of the copy, written from its begin; not closed.
         translations: The functions that translate messages to well-known schemas, by message class.
         keys: Only messages of keys that match one of these; none: all.

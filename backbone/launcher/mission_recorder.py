@@ -86,7 +86,6 @@ class MissionRecorder:
     """Keeps one recorder running.
 
     Args:
-        mission: Name of the mission.
         path: File of the recording; the first unused name of its series is used.
         options: Further options of the command ``record``.
         facts: The facts of the mission, which the recorder reads from standard input.

@@ -33,8 +33,6 @@ class NamesKeeper:
     """Subscribes to components, asks the RC manager for its RCs, and writes the names after each change.
 
     Args:
-        bus: Bus of the launcher.
-        clock: The mission's clock.
         directory: The run folder.
     """
 

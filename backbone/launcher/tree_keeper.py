@@ -72,8 +72,6 @@ class TreeKeeper:
     """Answers questions about the tree and carries out its changes.
 
     Args:
-        bus: Bus of the launcher.
-        clock: The mission's clock.
         description: The mission as it came up.
         text: Content of its mission file.
         begin_root: Keeps a root running from now on; see ``WishKeeper.begin_root``.

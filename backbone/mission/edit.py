@@ -48,7 +48,6 @@ class NewElement:
     """An element to be added.
 
     Attributes:
-        tag: Its tag.
         attributes: Its attributes; they are written in the declared order.
         children: Elements in it, in this order.
     """
@@ -62,7 +61,6 @@ def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> byte
     """Return the text with another value; its quotes stay, and a new attribute gets its place in the declared order.
 
     Args:
-        name: The attribute.
         value: The new value; None: the attribute is removed.
 
     Raises:
@@ -95,8 +93,6 @@ def add(data: bytes, parent: Path, new: NewElement, at: int | None = None) -> by
     """Return the text with one more element, on lines of its own if its neighbors have lines of their own.
 
     Args:
-        parent: Path of its parent.
-        new: The element.
         at: Its number among its siblings afterwards; None: after those of its tag, in the declared order of tags.
 
     Raises:
@@ -116,8 +112,6 @@ def insert(data: bytes, parent: Path, other: bytes, at: int) -> bytes:
     """Return the text with the root of another text inserted unchanged, with the comments in it.
 
     Args:
-        parent: Path of its parent.
-        other: The other text.
         at: Its number among its siblings afterwards.
 
     Raises:
@@ -136,8 +130,6 @@ def place_for(parent: Element, tag: str, at: int | None = None) -> int:
     """Return the number a new child would have among its siblings.
 
     Args:
-        parent: Its parent.
-        tag: Its tag.
         at: The wanted number; None: after the last of its tag, else after the tags that come before it by declaration.
     """
     if at is not None:

@@ -30,7 +30,6 @@ class Fault:
         file: The file, as it was named to the reader.
         line: From 1.
         column: From 1, in characters.
-        message: The fault.
         remedy: How to correct it.
     """
 

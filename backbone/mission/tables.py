@@ -33,8 +33,6 @@ class Tables:
     """Elements by name; if several have one name, the first.
 
     Attributes:
-        hosts: Machines.
-        types: Component types.
         by_type: Type → all its resources, in the order of the file.
         world: The simulated world, if there is one.
         behaviors: Every node of the behavior tree, parents before their children.

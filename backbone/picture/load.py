@@ -79,7 +79,6 @@ class ModuleLoad:
         processor_s: Duration of all its updates until now.
         cores: Seconds of updates per second between the readings.
         rate_hz: Updates a second between the readings.
-        longest_s: Its longest update.
     """
 
     unit: str

@@ -42,7 +42,6 @@ class BringUp:
 
         Args:
             bus: For questions to nameserver and creators.
-            clock: The mission's clock.
             book: All placements; the choice of hosts.
             creators: Find the outcome of orders whose answer was lost.
             news: Wakes waiting starts after each event.

@@ -46,7 +46,6 @@ class Meetings:
 
         Args:
             bus: For subscriptions and questions.
-            clock: The mission's clock.
             book: Hosts and placements.
             creators: Lists the creators and their processes.
             news: Gets the end of each meeting.

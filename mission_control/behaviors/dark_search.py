@@ -108,7 +108,6 @@ class DarkSearch:
     Args:
         dark_level: Floor darker than this is dark, 0 to 255.
         leg_m: Distance to drive before the next look around.
-        speed_m_s: Speed of driving.
         looks: Number of looks around after which the search gives up; 0: never.
     """
 

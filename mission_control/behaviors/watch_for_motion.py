@@ -208,7 +208,6 @@ def run_times(given: WatchParameters, given_s: float) -> RunTimes:
     """Return the best run times for a target that is in view for ``given.view_s``.
 
     Args:
-        given: Parameters of the behavior.
         given_s: Run time in the mission file, seconds.
 
     Raises:

@@ -28,8 +28,6 @@ class Way:
     """The state of a way to one place.
 
     Args:
-        place: Goal.
-        speed_m_s: Speed on the straight way.
         reached_within_m: Distance that counts as reached.
         within_s: Time after which it fails; only time of grants counts; 0: never.
     """

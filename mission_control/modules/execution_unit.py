@@ -145,7 +145,6 @@ class AwaitedKeys(NamedTuple):
     """What a module waits for.
 
     Attributes:
-        runs: Number of its runs.
         keys: Key → True if the module has had an earlier value; empty: it runs in the next round.
         needs_all: True: it needs all of them; False: one is enough.
     """
@@ -188,8 +187,6 @@ class ExecutionUnit:
     """The modules of one unit at work.
 
     Args:
-        name: Name of the unit.
-        graph: The whole graph.
         modules: Name → module, for at least all modules of the unit.
         trigger: Condition for rounds.
         start_s: Time of its first tick.

@@ -54,7 +54,6 @@ class UnitExchanges:
         component: Component that runs the unit; its parameters name the running modules.
         modules: Name → module; kept up to date.
         graph: The unit's graph at its start.
-        unit: Returns the unit.
         views: Returns the debug views for the class of a module that produces from now on.
         exchanged: Called after an exchange with the orders of all running modules, which become the component's
             parameters.

@@ -97,9 +97,7 @@ def steer(pose: TargetPose, stage: Stage, last: SpeedCommand, elapsed_s: float, 
     """Return the next command.
 
     Args:
-        pose: Pose of the robot.
         stage: Stage of the approach; in ``SEARCHING`` and ``ARRIVED`` the robot is brought to rest.
-        last: The previous command.
         elapsed_s: Time since then.
         stop_m: Distance of the robot's place from the board.
 

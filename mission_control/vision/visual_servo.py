@@ -24,8 +24,6 @@ class ServoStep:
     """The decision from one picture.
 
     Attributes:
-        command: Command for the robot.
-        stage: Stage of the approach.
         track: Result of the tracker.
         pose: Pose of the robot; None while the target is not in sight.
     """

@@ -207,8 +207,6 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Repeat a packet that moves the robot, until the next command or for ``COMMAND_TIMEOUT_S``.
 
         Args:
-            hold: Of the command.
-            order: The command.
             packet: In the robot's protocol.
             is_moving: False: the robot stands still with this packet, so it needs no halt if commands stop.
 

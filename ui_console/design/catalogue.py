@@ -36,8 +36,6 @@ class TypeEntry:
 
     Attributes:
         name: Its name in mission files.
-        class_path: Class of the component.
-        role: Its role.
         needs: Role → type of resource that an ARC needs.
         uses: Types of resource to which a resource must be linked.
         is_stock: True: the project ships it.
@@ -96,7 +94,6 @@ def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
     """Return the description of a type, as lines for people.
 
     Args:
-        entry: The type.
         facts: Class path → facts of the class.
     """
     lines = [f"{entry.name}: {entry.role}, {entry.class_path}"]

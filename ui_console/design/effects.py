@@ -88,7 +88,6 @@ def add_behavior(text: bytes, parent: Path, kind: str, name: str, priority: int 
 
     Args:
         parent: A behavior; the mission or its ``<behaviors>`` for a root.
-        kind: Its type.
         priority: Among its siblings.
     """
     _free(outline(text), "behavior", name)

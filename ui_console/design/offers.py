@@ -47,8 +47,6 @@ class Offer:
 
     Attributes:
         label: Its name in a list.
-        doc: Its meaning.
-        asks: Its questions.
         build: Returns the command for the answers in this order; may refuse with ``DesignRefused``.
     """
 

@@ -63,7 +63,6 @@ class DesignServer:
 
         Args:
             ready: Called with the port once the server listens.
-            end: Event that ends the server.
 
         Raises:
             CannotListen: The address is in use, or does not belong to this machine.

@@ -98,7 +98,6 @@ def arc_abilities(
 
     Args:
         kind: Its name.
-        types: Component types of the mission.
         resources: Hardware of the mission; without it there is no choice of kinds.
 
     Example:

@@ -124,7 +124,6 @@ class Sought:
     Attributes:
         asker: Address of the console that asks.
         user: The person at that console.
-        robot: The robot asked for.
         why: The reason, for people.
         until_s: Mission time at which the question times out; the answer is then no.
         topic: To have the robot, or to lift its stop.
@@ -189,7 +188,6 @@ class ConsentDesk:
         """Answer the first question; a yes for the robot settles all others for it, too. Return all settled ones.
 
         Args:
-            is_given: The answer.
             reason: For people.
             number: The question on the person's screen; if it is not the first one, none is answered. None: the first.
         """

@@ -38,8 +38,6 @@ class ConsoleModel:
     """The state of one console; screens read it, events change it.
 
     Args:
-        name: Name of this console.
-        user: The person at this console.
         team: Model of the mission; None: a new one.
         sees: True if pictures are expected while a robot is held whose ARC gives any; their absence then raises an
             alarm.

@@ -61,7 +61,6 @@ class Granted(Event):
     """The RCs are held; repeated, with ``again``, after each suspension.
 
     Attributes:
-        robot: The robot held.
         rcs: Role → name of each RC held.
         epochs: RC → epoch.
         until_s: The slice lasts at least until then.
@@ -88,7 +87,6 @@ class CommandApplied(Event):
 
     Attributes:
         rc: The robot.
-        epoch: Of the grant.
         command: Its word.
         values: After clipping.
         took_s: Time from the operator's action to the answer, machine seconds; negative: not measured.
@@ -186,7 +184,6 @@ class ConsentAsked(Event):
     """This console asked other operators to release a robot, or to lift a stop.
 
     Attributes:
-        robot: The robot.
         of: Names of the consoles asked.
         until_s: The question times out then, which is a no.
         topic: To have the robot, or to lift its stop.
@@ -203,7 +200,6 @@ class ConsentHeard(Event):
     """An operator answered this console's question, or it timed out.
 
     Attributes:
-        robot: The robot.
         user: The person who decided.
         is_given: True: the robot is being given back, or may move.
         reason: For people.
@@ -264,7 +260,6 @@ class Heard(Event):
     """A message arrived.
 
     Attributes:
-        body: The message.
         source: Address of the sender, for a message that does not name its component.
     """
 

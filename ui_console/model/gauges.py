@@ -55,7 +55,6 @@ def gauges(readings: Readings, reports: Sequence[FieldForm] = ()) -> list[GaugeV
     """Return a gauge for each value, shares first, in the order of the report.
 
     Args:
-        readings: The values.
         reports: Their known declarations.
 
     Example:

@@ -16,11 +16,7 @@ REMEDY = "Look after the terminal of 'scout-backbone up'; 'scout-backbone down' 
 
 
 class HealthBoard:
-    """The newest report on the mission's health.
-
-    Args:
-        alarms: Book of the alarms for absences.
-    """
+    """The newest report on the mission's health."""
 
     def __init__(self, alarms: AlarmBook) -> None:
         self._alarms = alarms

@@ -66,7 +66,6 @@ def key_list(rows: Sequence[KeyRow], words: str, order: KeyOrder, dropped: int) 
     Args:
         rows: Rows in the order of keys.
         words: See ``with_words``.
-        order: Order of the result.
         dropped: Number of messages that came too fast to be counted.
     """
     found = with_words(rows, words)

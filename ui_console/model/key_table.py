@@ -73,7 +73,6 @@ class KeyTable:
         Args:
             key: With ``scout/<mission>/``.
             source: Address of the sender.
-            schema: Schema of the message.
             size_bytes: Its length.
             at_s: Mission time of its arrival.
         """

@@ -17,7 +17,6 @@ class KeyView:
     """View of the messages of one key and schema; its size is bounded for any number of messages.
 
     Args:
-        schema: Schema of the messages.
         views: Schema → its view.
         span_s: Time span of the plots, mission seconds.
     """

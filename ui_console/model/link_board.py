@@ -20,11 +20,7 @@ NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped 
 
 
 class LinkBoard:
-    """State of links and hosts, from messages.
-
-    Args:
-        alarms: Book of the alarms for their faults.
-    """
+    """State of links and hosts, from messages."""
 
     def __init__(self, alarms: AlarmBook) -> None:
         self._alarms = alarms

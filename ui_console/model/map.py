@@ -108,7 +108,6 @@ class MapBoard:
     """The map of a mission.
 
     Args:
-        picture: Model of the mission.
         links: Links with the mission's radios.
     """
 

@@ -43,7 +43,6 @@ class FoundLocalizer:
     """A component that localizes robots.
 
     Attributes:
-        address: Its address.
         words: Source of the positions, for people.
     """
 
@@ -134,7 +133,6 @@ def start_of(
     over everything below the console, and the orders of a console are equal and share resources in turns.
 
     Args:
-        number: Of the order.
         kind: Of the ARC.
         localizer: The localizer; None: the order needs none.
         console: Address of the console.

@@ -85,7 +85,6 @@ class GivenOrder:
 
     Attributes:
         number: Number of the order, from 1, unique at its console.
-        state: Its state.
         why: Why it waits, failed or ended; for a done order, the report of its behavior; may be empty.
         by: Source of the robot's position, for people; empty: not needed, or not known yet.
     """

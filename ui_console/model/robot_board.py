@@ -29,8 +29,6 @@ class RobotBoard:
     """State of the robots, from messages.
 
     Args:
-        picture: Model of the mission.
-        alarms: Book of the alarms for stops.
         links: Knows the missing RCs.
         lift_remedy: Remedy for a stop, for an operator of this console.
     """

@@ -81,7 +81,6 @@ class Step:
 
     Attributes:
         at_s: Time since the grant.
-        wish: The command.
         at_once: True: read from a pipe, it takes effect immediately.
     """
 

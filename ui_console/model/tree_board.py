@@ -66,7 +66,6 @@ class TreeBoard:
         Args:
             components: Components of the mission; behaviors among them are nodes, execution units are not.
             lost: Address of each lost node → time of the loss.
-            schedule: The newest.
         """
         requests = {component_of(request.owner): request for request in (schedule.requests if schedule else [])}
         nodes = {node.address: node for node in components if is_behavior(node)}

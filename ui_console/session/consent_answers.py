@@ -34,7 +34,6 @@ class ConsentAnswers:
     Args:
         bus: For the tokens of the consoles that ask.
         user: The person asked.
-        clock: The mission's clock.
         show: Called with each event for that person's screens.
         acted: Records the person's decisions.
     """
@@ -78,7 +77,6 @@ class ConsentAnswers:
         """Answer the first question; a yes for the robot releases it. Return whether there was such a question.
 
         Args:
-            is_given: The answer.
             reason: For people.
             number: See ``ConsentDesk.decide``.
         """

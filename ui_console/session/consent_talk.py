@@ -163,7 +163,6 @@ class ConsentTalk:
 
         Args:
             asker: Address of the console that asks.
-            asked: The question.
             at_once: The answer if no decision of the operator is needed.
 
         Raises:

@@ -72,8 +72,6 @@ class ConsoleFeed:
     """Turns the messages of a mission into events.
 
     Args:
-        bus: Bus of its component.
-        clock: The mission's clock.
         show: Called in the event loop with each event, in order.
     """
 
@@ -370,11 +368,7 @@ class ConsoleFeed:
 
 
 class _Answered:
-    """Ends its block at a refusal or a missing answer.
-
-    Args:
-        failed: Called with the error.
-    """
+    """Ends its block at a refusal or a missing answer."""
 
     def __init__(self, failed: Callable[[Refusal | LinkError], None]) -> None:
         self._failed = failed

@@ -172,7 +172,6 @@ async def play_gamepad(
     """Drive by the device until the device is gone or the task is cancelled; then stop the wheels.
 
     Args:
-        device: The open device.
         stick: A new stick.
         hold: Called repeatedly while the dead-man button is held: forward, right, and the time a call counts.
         stop: Called when the button is released.

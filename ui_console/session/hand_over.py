@@ -58,7 +58,6 @@ def decide(asked: AskHandOver, user: str, robot: str, since_s: float, *, by_scri
         user: The person at this console; empty: none.
         robot: The robot held here; empty: none.
         since_s: Time of the claim here.
-        by_script: A script drives it.
 
     Example:
         >>> asked = AskHandOver("scout1", "anna", 5.0)

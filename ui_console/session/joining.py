@@ -32,8 +32,6 @@ class Joining:
     """A console that has not opened its bus yet.
 
     Attributes:
-        launch: Its identity.
-        clock: The mission's clock.
         secret: The secret of the mission's hub.
     """
 
@@ -54,9 +52,6 @@ class Joining:
 
 async def join(where: Where, parameters: dict[str, object] | None = None) -> Joining:
     """Return the identity of this process in the mission.
-
-    Args:
-        parameters: Of the console.
 
     Raises:
         Refusal: No such mission is up on this machine.

@@ -35,7 +35,6 @@ class HeardKeys:
     """Counts overheard messages by their headers, so it needs no message classes.
 
     Args:
-        clock: The mission's clock.
         known: Rows that are listed at once; after ``close``, all rows so far.
     """
 

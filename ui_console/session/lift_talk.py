@@ -46,7 +46,6 @@ class LiftTalk:
 
     Args:
         console: The person's console.
-        user: The person.
         show: Called with each event for that person's screens.
     """
 

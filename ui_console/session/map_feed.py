@@ -36,8 +36,6 @@ class MapFeed:
     """Turns messages about places into events.
 
     Args:
-        bus: Bus of its component.
-        clock: The mission's clock.
         show: Called in the event loop with each event, in order.
     """
 

@@ -14,11 +14,7 @@ if TYPE_CHECKING:
 
 
 class OperatorPresence:
-    """Shows when the operator leaves and returns.
-
-    Args:
-        console: The operator's console.
-    """
+    """Shows when the operator leaves and returns."""
 
     def __init__(self, console: AnyObserver) -> None:
         self._console = console

@@ -91,8 +91,6 @@ class RecordedPlay(Generic[Console]):
 
     Args:
         opened: Opens the recording's file once more.
-        machine: Clock of machine seconds.
-        name: Name of the console.
         new_console: Creates the console that receives the recording from a time on; its bus joins the given network.
 
     Raises:

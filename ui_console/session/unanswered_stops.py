@@ -20,8 +20,6 @@ class UnansweredStops:
     moves nothing.
 
     Args:
-        bus: Bus of the console.
-        clock: The mission's clock.
         heard: Called with each answer.
         showing_refusal: Makes a block that shows a refusal instead of raising it.
     """

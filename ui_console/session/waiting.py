@@ -22,7 +22,6 @@ class Waiting:
     """Asks again after each change of the schedule.
 
     Args:
-        console: The console that waits.
         hand_over: Messages with this person's other screens.
         waits_for: Returns the robot for which the console waits, and the begin of the wait; None: it no longer waits.
     """

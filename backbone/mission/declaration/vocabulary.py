@@ -56,7 +56,6 @@ class ElementRule:
     Attributes:
         attributes: By name, in the usual order of writing.
         children: Tag → fewest and most of these children; in the usual order of writing.
-        documentation: Its meaning.
     """
 
     attributes: dict[str, AttributeRule]

@@ -82,8 +82,6 @@ def in_view(passage: Passage, watcher: Point, *, least_m: float = 0.0) -> list[I
     """Return when the passing target is in the watcher's view, seconds from its departure, in order.
 
     Args:
-        passage: The passage of the target.
-        watcher: Place of the watcher.
         least_m: Width of the target that must be in view.
     """
     first_m, last_m = seen_along(watcher, passage.radius_m)

@@ -69,7 +69,6 @@ class DrivePhases:
     Pure. The phases have exponentially distributed durations, whose means give the wanted share.
 
     Args:
-        seed: Seed of the durations.
         driven: Share of the time in which the operator drives.
         drive_s: Mean time of driving, seconds.
     """

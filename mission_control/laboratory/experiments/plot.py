@@ -41,7 +41,6 @@ class Point(NamedTuple):
 
     Attributes:
         extra: Number of extra robots.
-        rate: The rate.
         low: Lower end of its 95 % interval.
         high: Upper end.
         predicted: Rate predicted from geometry and schedule; None: no prediction.

@@ -133,7 +133,6 @@ def simulate(
     """Run the missions of these seeds until a mission breaks a law; reproduce and shrink that mission.
 
     Args:
-        first: First seed.
         seeds: Number of seeds, 1 or more.
         tell: Called with lines of progress.
         processes: Number of processes; None: one for each processor, or only this one for few seeds.
