@@ -15,7 +15,6 @@ import msgspec
 
 from backbone.errors import Refusal
 from mission_control.behavior import BehaviorParameters
-from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
 from mission_control.behaviors.motion import DrivingSpeed, FloorPoint, NamedBody, NamedLocalizer
 from mission_control.behaviors.way import keep_distance
@@ -71,10 +70,6 @@ class Follow(Driver[FollowParameters]):
                 keep_distance(position, target, given.distance_m, speed_m_s=given.speed_m_s, tolerance_m=tolerance_m)
             )
             await self.clock.sleep_s(DECIDE_EVERY_S)
-
-    async def suspended(self, reason: str, by: str) -> None:
-        """Keep no state: after the suspension only the positions at that time matter."""
-        self.report(f"suspended: {suspended_because(reason, by)}")
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, and the distance; negative: not known yet."""
