@@ -12,18 +12,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 
-from mission_control.behaviors.motion import (
-    PATIENCE_S,
-    FloorPoint,
-    Maneuver,
-    Motion,
-    Position,
-    Watchdog,
-    head_for,
-    shake_free,
-    turn_to,
-    turned,
-)
+from mission_control.behaviors.motion import FloorPoint, Motion, Position, Pursuit, turn_to, turned
 
 TAKE_OFF_M = 0.20  # measured: a box 30 cm high and 20 cm deep is cleared from 15 to 32 cm before its front
 RUN_UP_M = 0.30  # chosen: a straight way before the take-off, so that the robot arrives with the right heading
@@ -92,15 +81,14 @@ class JumpCourse:
 
     def __init__(self, obstacle: Obstacle, *, attempts: int, speed_m_s: float, onward_m: float) -> None:
         self._obstacle, self._attempts = obstacle, attempts
-        self._speed_m_s, self._goal_m = speed_m_s, obstacle.depth_m + max(onward_m, BEYOND_M)
+        self._goal_m = obstacle.depth_m + max(onward_m, BEYOND_M)
         self.stage = JumpStage.RUN_UP
         """The stage of the jump."""
         self.jumps = 0
         """Number of jumps that the robot obeyed."""
         self._jumped_s = -math.inf
         self._is_seen_landing = False
-        self._watchdog = Watchdog(PATIENCE_S, speed_m_s)
-        self._freeing: Maneuver | None = None
+        self._pursuit = Pursuit(speed_m_s)
 
     @property
     def is_final(self) -> bool:
@@ -117,8 +105,8 @@ class JumpCourse:
 
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision depends only on its position then."""
-        self._freeing, self._is_seen_landing = None, False
-        self._watchdog.pause()
+        self._is_seen_landing = False
+        self._pursuit.interrupt()
         if self.stage is not JumpStage.AIRBORNE and not self.is_final:
             self.stage = JumpStage.RUN_UP
 
@@ -143,11 +131,8 @@ class JumpCourse:
             return Act.WAIT
         if self.stage is JumpStage.AIRBORNE:
             self._land(position)
-        if self._freeing is not None:
-            motion = self._freeing.motion(now_s)
-            if motion is not None:
-                return motion
-            self._freeing = None
+        if (motion := self._pursuit.freeing(now_s)) is not None:
+            return motion
         if self.stage is not JumpStage.ONWARD and self._is_beyond(position):
             self._enter(JumpStage.ONWARD)
         return self._go_on(position, now_s)
@@ -162,17 +147,17 @@ class JumpCourse:
                 if obstacle.passed_m(position) >= self._goal_m or goal.distance_m(position) < ARRIVED_M:
                     self._enter(JumpStage.OVER)
                     return Act.WAIT
-                return self._go(goal, position, now_s)
+                return self._pursuit.go(goal, position, now_s)
             case JumpStage.RUN_UP:
                 goal = obstacle.ahead(-TAKE_OFF_M - RUN_UP_M)
                 if goal.distance_m(position) < ARRIVED_M:
                     self._enter(JumpStage.APPROACH)
-                return self._go(goal, position, now_s)
+                return self._pursuit.go(goal, position, now_s)
             case JumpStage.APPROACH:
                 goal = obstacle.ahead(-TAKE_OFF_M)
                 if goal.distance_m(position) < AT_TAKE_OFF_M:
                     self._enter(JumpStage.AIM)
-                return self._go(goal, position, now_s)
+                return self._pursuit.go(goal, position, now_s)
             case _:
                 if obstacle.ahead(-TAKE_OFF_M).distance_m(position) > 2 * AT_TAKE_OFF_M:
                     self._enter(JumpStage.RUN_UP)
@@ -185,7 +170,7 @@ class JumpCourse:
     def _land(self, position: Position) -> None:
         """Judge the jump; a heading that was reversed in the air means that the robot lies on its back."""
         if self._is_seen_landing and abs(turned(position.heading_rad - self._obstacle.heading_rad)) > math.pi / 2:
-            self._freeing = shake_free()
+            self._pursuit.free()
         if self._is_beyond(position):
             self._enter(JumpStage.ONWARD)
         else:
@@ -196,10 +181,4 @@ class JumpCourse:
 
     def _enter(self, stage: JumpStage) -> None:
         self.stage = stage
-        self._watchdog.rest()
-
-    def _go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
-        if self._watchdog.is_stuck(goal.distance_m(position), now_s):
-            self._freeing = shake_free()
-            self._watchdog.rest()
-        return head_for(position, goal, self._speed_m_s)
+        self._pursuit.rest()

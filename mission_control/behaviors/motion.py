@@ -221,18 +221,24 @@ class Pursuit:
         self._freeing = None
         self._watchdog.pause()
 
+    def free(self) -> None:
+        """Shake the robot free from the next decision on."""
+        self._freeing = shake_free()
+
+    def freeing(self, now_s: float) -> Motion | None:
+        """Return the motion that shakes the robot free; None: it is not being shaken."""
+        motion = self._freeing.motion(now_s) if self._freeing is not None else None
+        if motion is None:
+            self._freeing = None
+        return motion
+
     def go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
         """Return the motion towards the goal, or the one that frees a stuck robot."""
         if self._freeing is None and self._watchdog.is_stuck(goal.distance_m(position), now_s):
-            self._freeing = shake_free()
+            self.free()
             self._watchdog.rest()
             self.freed += 1
-        if self._freeing is not None:
-            motion = self._freeing.motion(now_s)
-            if motion is not None:
-                return motion
-            self._freeing = None
-        return head_for(position, goal, self._speed_m_s)
+        return self.freeing(now_s) or head_for(position, goal, self._speed_m_s)
 
 
 def _within(value: float, most: float) -> float:
