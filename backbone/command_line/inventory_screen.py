@@ -12,7 +12,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from backbone.component.abilities import UNLIMITED, CommandForm, FieldForm, ValueKind
+from backbone.component.abilities import CommandForm, FieldForm, range_text
 from backbone.component_database.messages import Multiplicity, TypeCount
 from backbone.naming import Subsystem, address
 from backbone.picture.mission import MissionPicture
@@ -75,28 +75,6 @@ def _command_rows(command: CommandForm) -> list[tuple[str, ...]]:
 def _field_cells(field: FieldForm) -> tuple[str, str, str, str, str]:
     default = "needed" if field.is_required else value_text(field.default)
     return field.name, str(field.kind), field.unit, range_text(field), default
-
-
-def range_text(field: FieldForm) -> str:
-    """Return the legal values of a field, for people; empty: any value is legal.
-
-    Example:
-        >>> range_text(FieldForm("turn_rad_s", ValueKind.NUMBER, "rad/s", -2.0, 2.0))
-        '-2 to 2'
-        >>> range_text(FieldForm("on", ValueKind.FLAG)), range_text(FieldForm("gait", ValueKind.TEXT, choices=["trot"]))
-        ('yes or no', 'trot')
-        >>> range_text(FieldForm("count", ValueKind.WHOLE, least=0)), range_text(FieldForm("x_m", ValueKind.NUMBER))
-        ('at least 0', '')
-    """
-    if field.choices:
-        return ", ".join(field.choices)
-    if field.kind is ValueKind.FLAG:
-        return "yes or no"
-    least = f"{field.least:g}" if field.least > -UNLIMITED else ""
-    most = f"{field.most:g}" if field.most < UNLIMITED else ""
-    if least and most:
-        return f"{least} to {most}"
-    return f"at least {least}" if least else f"at most {most}" if most else ""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ declares its commands and reports as structs; units come from the names of the f
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -138,6 +138,31 @@ def unit_of(name: str) -> str:
         ('rad/s', '')
     """
     return next((unit for suffix, unit in UNITS.items() if name.endswith(f"_{suffix}")), "")
+
+
+def range_text(field: FieldForm, number: Callable[[float], str] = "{:g}".format) -> str:
+    """Return the legal values of a field, for people; empty: any value is legal.
+
+    Args:
+        number: Returns the text of a limit.
+
+    Example:
+        >>> range_text(FieldForm("turn_rad_s", ValueKind.NUMBER, "rad/s", -2.0, 2.0))
+        '-2 to 2'
+        >>> range_text(FieldForm("on", ValueKind.FLAG)), range_text(FieldForm("gait", ValueKind.TEXT, choices=["trot"]))
+        ('yes or no', 'trot')
+        >>> range_text(FieldForm("count", ValueKind.WHOLE, least=0)), range_text(FieldForm("x_m", ValueKind.NUMBER))
+        ('at least 0', '')
+    """
+    if field.choices:
+        return ", ".join(field.choices)
+    if field.kind is ValueKind.FLAG:
+        return "yes or no"
+    least = number(field.least) if field.least > -UNLIMITED else ""
+    most = number(field.most) if field.most < UNLIMITED else ""
+    if least and most:
+        return f"{least} to {most}"
+    return f"at least {least}" if least else f"at most {most}" if most else ""
 
 
 def field_forms(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from backbone.component.abilities import UNLIMITED, FieldForm, ValueKind
+from backbone.component.abilities import UNLIMITED, FieldForm, ValueKind, range_text
 from backbone.errors import Refusal
 from backbone.spoken import three_digits
 from ui_console.model.applied import words_of
@@ -32,18 +32,11 @@ def label_of(field: FieldForm) -> str:
         >>> label_of(FieldForm("on", ValueKind.FLAG)), label_of(FieldForm("gait", ValueKind.TEXT, choices=["trot"]))
         ('on, yes or no', 'gait: trot')
     """
-    words, unit = words_of(field.name), f" {field.unit}" if field.unit else ""
-    if field.kind is ValueKind.FLAG:
-        return f"{words}, yes or no"
+    words, legal = words_of(field.name), range_text(field, three_digits)
     if field.choices:
-        return f"{words}: {', '.join(field.choices)}"
-    if has_range(field):
-        return f"{words}, {three_digits(field.least)} to {three_digits(field.most)}{unit}"
-    if field.least > -UNLIMITED or field.most < UNLIMITED:
-        has_least = field.least > -UNLIMITED
-        limit = f"at least {three_digits(field.least)}" if has_least else f"at most {three_digits(field.most)}"
-        return f"{words}, {limit}{unit}"
-    return f"{words},{unit}" if unit else words
+        return f"{words}: {legal}"
+    unit = f" {field.unit}" if field.unit and field.kind is not ValueKind.FLAG else ""
+    return f"{words}, {legal}{unit}" if legal else f"{words},{unit}" if unit else words
 
 
 def has_range(field: FieldForm) -> bool:
