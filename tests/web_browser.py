@@ -149,11 +149,15 @@ class Finger:
         box = await self._page.locator("#pad").bounding_box()
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         await self.put_down(x, y)
-        await self._send("touchMove", [{"x": x + 0.45 * box["width"], "y": y}])
+        await self.move(x + 0.45 * box["width"], y)
 
     async def put_down(self, x: float, y: float) -> None:
         self._touches = await self._page.context.new_cdp_session(self._page)
         await self._send("touchStart", [{"x": x, "y": y}])
+
+    async def move(self, x: float, y: float) -> None:
+        """Move it there without lifting it."""
+        await self._send("touchMove", [{"x": x, "y": y}])
 
     async def lift(self) -> None:
         """Take it away."""

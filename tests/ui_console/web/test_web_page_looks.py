@@ -166,7 +166,8 @@ async def test_all_that_can_be_pressed_is_reached_by_tab_alone_and_seen_to_have_
             pressable = await page.evaluate(f"""() => {{
               {name_of}
               const all = [...document.querySelectorAll("button, input, select, [tabindex='0']")];
-              return all.filter((one) => one.checkVisibility() && !one.disabled).map(nameOf);
+              const isThere = (one) => one.checkVisibility({{ visibilityProperty: true }}) && !one.disabled;
+              return all.filter(isThere).map(nameOf);
             }}""")
             return set(pressable) - reached
 

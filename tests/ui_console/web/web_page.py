@@ -31,7 +31,8 @@ COVERED = """() => {
     const found = document.elementFromPoint(box.x + box.width / 2, box.y + share * box.height);
     return found === one || one.contains(found) || found?.contains(one);
   };
-  return controls.filter((one) => one.checkVisibility() && !one.disabled).flatMap((one) => ends.flatMap((end) => {
+  const isThere = (one) => one.checkVisibility({ visibilityProperty: true }) && !one.disabled;
+  return controls.filter(isThere).flatMap((one) => ends.flatMap((end) => {
     document.activeElement.blur();
     scrollTo(0, end);
     one.focus();

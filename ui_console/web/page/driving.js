@@ -36,6 +36,7 @@ export class Driving {
     this.keys = new Set();
     /** @type {number | null} */
     this.pointer = null;
+    this.box = pad.getBoundingClientRect(); // where the pad was when the pointer grabbed it
     /** @type {Stick} */
     this.stick = [0, 0];
     this.gamepad = new Gamepad(does);
@@ -112,6 +113,7 @@ export class Driving {
     this.pad.focus({ preventScroll: true });
     this.pad.setPointerCapture(event.pointerId);
     this.pointer = event.pointerId;
+    this.box = this.pad.getBoundingClientRect();
     this.drag(event);
   }
 
@@ -122,9 +124,8 @@ export class Driving {
       this.drop(event); // browsers report the release of one mouse button only when all are up, and none to a menu
       return;
     }
-    const box = this.pad.getBoundingClientRect();
-    let right = (2 * (event.clientX - box.left)) / box.width - 1;
-    let forward = 1 - (2 * (event.clientY - box.top)) / box.height;
+    let right = (2 * (event.clientX - this.box.left)) / this.box.width - 1;
+    let forward = 1 - (2 * (event.clientY - this.box.top)) / this.box.height;
     const length = Math.hypot(right, forward);
     if (length > 1) {
       right /= length;

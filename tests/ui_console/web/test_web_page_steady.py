@@ -1,0 +1,72 @@
+"""What is under the finger of an operator stays there, whatever else the page comes to show."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from known_arcs import lit_types
+from web_browser import Finger
+from web_page import ALL_SIZES, Wheels, card, page_at, take
+from web_stage import Stage
+
+from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
+from backbone.naming import Subsystem
+from resource_pool.arcs.drive import DriveArc
+from resource_pool.arcs.skeleton import LitDriveArc
+from resource_pool.commands import Move
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
+
+CAPTURE = ComponentType(
+    "capture", "x:Y", Subsystem.RESOURCE_POOL, needs=DriveArc.kinds(), abilities=DriveArc.abilities()
+)
+HANDS = ("pad", "halt", "release", "stop-mine", "speed")
+HARDWARE = [Resource(f"{kind}1", kind) for kind in LitDriveArc.kinds().values()]
+
+
+async def centers(page: Any, *names: str) -> dict[str, tuple[int, int]]:
+    """Return where a finger would press these."""
+    boxes = {name: await page.locator(f"#{name}").bounding_box() for name in names}
+    return {name: (round(box["x"] + box["width"] / 2), round(box["y"] + 10)) for name, box in boxes.items()}
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_pad_and_buttons_stay_when_the_robot_is_granted_and_when_its_commands_are_known(
+    stage: Stage, size: str
+) -> None:
+    async with page_at(stage, size) as page:
+        stage.placer.on_arc = lambda arc: None
+        await card(page).get_by_role("button", name="Take over").click()
+        await page.wait_for_selector("body.is-asking")
+        waiting = await centers(page, "pad", "halt", "release")
+        for arc in stage.placer.arcs.values():
+            await arc.grant()
+        await page.wait_for_selector("body[data-held=scout1]")
+        assert await centers(page, "pad", "halt", "release") == waiting, "granted"
+        held = await centers(page, *HANDS)
+        stage.know_commands([CAPTURE, *lit_types("lit_drive")], HARDWARE)
+        await page.locator("#commands").wait_for()
+        assert await centers(page, *HANDS) == held, "commands known"
+
+
+async def test_a_question_that_pushes_the_pad_down_turns_no_slow_finger_into_a_fast_one(stage: Stage) -> None:
+    async with page_at(stage, "tablet") as page:
+        await take(page)
+        wheels = Wheels(stage)
+        await page.locator("#pad").scroll_into_view_if_needed()
+        box = await page.locator("#pad").bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + 0.4 * box["height"]
+        finger = Finger(page)
+        await finger.put_down(x, y)
+        await wheels.wait_turning()
+        slow = wheels.news[-1]
+        assert isinstance(slow, Move)
+        await page.locator("#consent").evaluate("question => { question.hidden = false; }")
+        assert (await page.locator("#pad").bounding_box())["y"] > box["y"] + box["height"] / 4, "it moved"
+        await finger.move(x, y - 1)
+        wheels.forget()
+        await wheels.wait_turning()
+        assert wheels.news[-1].forward_m_s == pytest.approx(slow.forward_m_s, rel=0.2)
+        await finger.lift()
