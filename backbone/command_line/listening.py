@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.mission_time import was_started_again
+from backbone.component.mission_time import MissionStart, ask_time
 from backbone.errors import Refusal
 from backbone.launcher.endings import say
 
@@ -46,15 +46,22 @@ def watching_end(bus: Bus, clock: Clock, ended: Callable[[str], None]) -> Iterat
     line = f"{bus.mission} has ended, or its hub cannot be reached"
     timer = loop.call_later(GONE_AFTER_S, ended, line)  # the hub may have left just now, and then no news comes
     comparing: asyncio.Task[None] | None = None
-    was_away = False
+    start, was_away = MissionStart(), False
+
+    async def compare_times() -> None:
+        heard = await ask_time(bus, clock)
+        if was_away and start.is_over(heard):
+            ended(f"{bus.mission} was started again; repeat the command for the new mission")
+        else:
+            start.follow(heard, clock)
 
     def link_changed(is_up: bool) -> None:
         nonlocal timer, comparing, was_away
         timer.cancel()
         if not is_up:
             timer, was_away = loop.call_later(GONE_AFTER_S, ended, line), True
-        elif was_away and (comparing is None or comparing.done()):
-            comparing = loop.create_task(_compare_times(bus, clock, ended), name="the mission's time")
+        elif comparing is None or comparing.done():
+            comparing = loop.create_task(compare_times(), name="the mission's time")
 
     watching = bus.watch_link(link_changed)
     try:
@@ -64,11 +71,6 @@ def watching_end(bus: Bus, clock: Clock, ended: Callable[[str], None]) -> Iterat
         timer.cancel()
         if comparing is not None:
             comparing.cancel()
-
-
-async def _compare_times(bus: Bus, clock: Clock, ended: Callable[[str], None]) -> None:
-    if await was_started_again(bus, clock):
-        ended(f"{bus.mission} was started again; repeat the command for the new mission")
 
 
 @asynccontextmanager

@@ -25,7 +25,7 @@ from backbone.component.messages import (
     Story,
     StoryEvent,
 )
-from backbone.component.mission_time import was_started_again
+from backbone.component.mission_time import MissionStart, ask_time
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
 from backbone.keys import ROOT, Conversation
@@ -108,15 +108,13 @@ class Recorder:
         self._subscribed: list[Overhearing] = []
         self._present: dict[str, None] = {}
         self._to_ask: dict[str, None] = {}
-        self._needs_asking = asyncio.Event()
-        self._awaited, self._was_told = frozenset[str](), asyncio.Event()
+        self._awaited, self._was_told, self._needs_asking = frozenset[str](), asyncio.Event(), asyncio.Event()
         self._bug: BaseException | None = None
-        self._one_at_a_time, self._needs_snapshot = asyncio.Lock(), asyncio.Event()
-        self._ended = asyncio.Event()
+        self._one_at_a_time, self._needs_snapshot, self._ended = asyncio.Lock(), asyncio.Event(), asyncio.Event()
         self._closing: dict[asyncio.Task[None], None] = {}
         self._has_link, self._is_cut_off, self._is_back = True, False, asyncio.Event()
         self._absence, self._has_other_hosts = LinkAbsence(STILL_COME_S if is_lossless else 0.0), False
-        self.was_started_again = False
+        self._start, self.was_started_again = MissionStart(float(about.get("start", 0.0))), False
         """True: it ended because a later mission of the same name is up."""
         self.on_flushed: Callable[[], None] = lambda: None
         """Called after each flush; settable."""
@@ -312,7 +310,10 @@ class Recorder:
         while not self.was_started_again:
             await self._is_back.wait()
             self._is_back.clear()
-            self.was_started_again = await was_started_again(self._bus, self._clock)
+            heard = await ask_time(self._bus, self._clock)
+            self.was_started_again = self._start.is_over(heard)
+            if not self.was_started_again:
+                self._start.follow(heard, self._clock)
         self.end()
 
     def _alive_changed(self, address: str, alive: bool) -> None:

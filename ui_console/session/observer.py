@@ -13,7 +13,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.mission_time import was_started_again
+from backbone.component.mission_time import MissionStart, ask_time
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.printable import printable_all
@@ -88,7 +88,7 @@ class Observer(Component[P_co], Generic[P_co]):
         self.answers = answers or ConsentAnswers(bus, self.user, clock, self.show, self.acted)
         """The questions to its operator."""
         self._stops: set[asyncio.Task[object]] = set()
-        self._was_cut = False
+        self._start, self._was_cut = MissionStart(), False
         self._answers_of = answers_of or (lambda user: self.answers if user in (self.user, self.address) else None)
 
     def acted(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
@@ -239,15 +239,18 @@ class Observer(Component[P_co], Generic[P_co]):
         return await asyncio.shield(task)
 
     def _heard_link(self, is_up: bool) -> None:
-        if is_up and self._was_cut:
-            self.start_task(self._end_with_mission(), "the mission's time")
-        self._was_cut = not is_up
+        self._was_cut |= not is_up
+        if is_up:
+            self.start_task(self._compare_times(), "the mission's time")
 
-    async def _end_with_mission(self) -> None:
-        """End if the link leads to a later mission of the same name, because no time on the screens would be true."""
-        if await was_started_again(self.bus, self.clock):
+    async def _compare_times(self) -> None:
+        """End if the link leads to a later mission of the same name; else have the clock show the mission's time."""
+        heard = await ask_time(self.bus, self.clock)
+        if self._was_cut and self._start.is_over(heard):
             log.warning("%s ends: its mission was started again", self.name)
             self.end("its mission was started again")
+        else:
+            self._start.follow(heard, self.clock)
 
     def _heard(self, event: FeedEvent) -> None:
         self.show(event)

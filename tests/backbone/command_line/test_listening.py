@@ -99,11 +99,25 @@ def test_a_command_goes_on_if_only_the_hub_was_started_again(
     assert capsys.readouterr().err == ""
 
 
-def serve_time(bus: LocalBus, origin_s: float) -> None:
-    """Answer as the nameserver of a mission that began at this time."""
+@pytest.mark.parametrize(("start_s", "ends"), [(77.0, False), (99.0, True)], ids=["the same start", "a later one"])
+def test_a_command_goes_on_after_a_sleep_of_the_first_host(
+    start_s: float, ends: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async def play() -> float:
+        bus = LinkedBus([(0.0, UP), (100.0, DOWN), (102.0, UP)])
+        serve_time(bus, 0.0, 77.0)
+        asyncio.get_running_loop().call_at(101.0, serve_time, bus, 50.0, start_s)
+        return await lasted_s(bus, 200.0)
+
+    assert run_virtual(play()) == pytest.approx(102.0 if ends else 200.0)
+    assert ("night was started again" in capsys.readouterr().err) == ends
+
+
+def serve_time(bus: LocalBus, origin_s: float, start_s: float = 0.0) -> None:
+    """Answer as the nameserver of a mission that began at this time; its first host's clock showed ``start_s`` then."""
 
     async def answer(_asked: object) -> MissionTime:
-        return MissionTime(VirtualClock().now_s() - origin_s, 1.0)
+        return MissionTime(VirtualClock().now_s() - origin_s, 1.0, 0.0, start_s)
 
     LocalBus(bus.network, NAMESERVER, VirtualClock()).serve(NAMESERVER, AskTime, answer)
 
