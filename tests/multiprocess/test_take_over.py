@@ -40,6 +40,7 @@ DRIVEN_WITHIN_S = 0.150
 SLICE_S = 5.0  # of the watcher, as the mission has it; who must not wait for its end drives earlier on any machine
 GIVEN_BACK_WITHIN_S = 1.0
 RESUMED_WITHIN_S = 5.0
+SEEN_WITHIN_S = 20.0
 TOLD_WITHIN_S = 2.0  # RCs publish their news when it is calm
 SECOND_WATCHER = re.search(
     r'<behavior type="watch_for_motion" name="watch-scout2".*?</behavior>', MISSION_XML.read_text(), re.DOTALL
@@ -172,6 +173,13 @@ async def counted(bus: Bus, address: str) -> dict[str, float]:
     return (await bus.ask(address, AskStatistics(), Statistics, within_s=2)).values
 
 
+async def sees_more_than(bus: Bus, frames: float) -> None:
+    """Return when the watcher, which has its robot, has seen more frames; a busy machine has few in a second."""
+    async with asyncio.timeout(SEEN_WITHIN_S):
+        while (await counted(bus, WATCHER))["frames_seen"] <= frames:  # noqa: ASYNC110  no message tells of each
+            await asyncio.sleep(0.05)
+
+
 async def audit(bus: Bus) -> None:
     """Nothing of a past epoch was applied, nothing was jammed."""
     world = await counted(bus, WORLD)
@@ -244,6 +252,7 @@ async def take_over_again_and_again(mission: RunningMission, cycles: int) -> lis
         for number in range(cycles):
             turns.append(await take_over(mission, bus, number))
             await watcher_holds_scout1(bus)
+        await sees_more_than(bus, before["frames_seen"])
         after = await counted(bus, WATCHER)
         story = (await bus.ask(WATCHER, AskStory(), Story, within_s=2)).events
         await audit(bus)
@@ -251,7 +260,6 @@ async def take_over_again_and_again(mission: RunningMission, cycles: int) -> lis
     print(f"granted after {statistics.median(turn.granted_after_s for turn in turns) * 1e3:.0f} ms (median),")
     print(f"driven after {statistics.median(driven) * 1e3:.0f} ms (median), {max(driven) * 1e3:.0f} ms at most")
     assert mission.component("watch-scout1")["pid"] == process
-    assert after["frames_seen"] > before["frames_seen"]
     assert after["times_suspended"] - before["times_suspended"] == cycles
     assert after["times_resumed"] - before["times_resumed"] == cycles
     told = [event.what for event in story]
