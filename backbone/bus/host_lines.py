@@ -1,9 +1,9 @@
 """Questions between two processes of one host over a socket between them: no other process and no thread is woken.
 
-Each process listens at a socket. Its answers to queries name this socket, see ``zenoh_questions``. A process that asks
-again connects to the socket, and keeps this *line* for all its questions to the other process; the answers come back on
-the line. If a process ends, its peers first read the answers that it had sent, and then the end of the line. Processes
-of other users are rejected.
+Each process listens at a socket. An entry in the host's folder names the socket for each address that the process
+serves, see ``host_entries``. A process that asks such an address connects to the socket, and keeps this *line* for all
+its questions to the other process; the answers come back on the line. The hub has no part in this. If a process ends,
+its peers first read the answers that it had sent, and then the end of the line. Processes of other users are rejected.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
+from pathlib import Path
 
 from backbone.bus.answers import AnsweredByMessage, Came, NoInbox
 from backbone.bus.declared import Withdrawal
+from backbone.bus.host_entries import Entry, HostEntries
 from backbone.bus.inbox import Whole
 from backbone.operating_system import local_sockets
 from backbone.waiting import settle
@@ -213,14 +215,17 @@ class _Asked:
 class HostLines:
     """The lines of one process. Make it inside a running event loop, and use it there.
 
+    Args:
+        directory: Folder of the mission's files on this host.
+
     Raises:
         OSError: The system refuses the socket.
     """
 
-    def __init__(self) -> None:
-        self._loop = asyncio.get_running_loop()
+    def __init__(self, directory: Path) -> None:
+        self._loop, self._entries = asyncio.get_running_loop(), HostEntries(directory)
         self._listening, self.name = local_sockets.listen()
-        """Name of the socket at which this process listens."""
+        """Name of the socket at which this process listens, for the entries in the host's folder."""
         self._inboxes: dict[str, Callable[[HostQuestion], None]] = {}
         self._answering: set[HostLine] = set()
         self._asking: dict[str, HostLine] = {}
@@ -228,22 +233,31 @@ class HostLines:
         self._number = 0
         self._loop.add_reader(self._listening, self._accept)
 
-    def serve(self, inbox: str, asked: Callable[[HostQuestion], None]) -> Withdrawal:
-        """Call a function with each question to this inbox until withdrawn."""
-        self._inboxes[inbox] = asked
-        return Withdrawal(lambda: self._inboxes.pop(inbox, None))
+    def serve(self, address: str, inbox: str, asked: Callable[[HostQuestion], None]) -> Withdrawal:
+        """Call a function with each question to this inbox of the address until withdrawn."""
+        self._inboxes[inbox], entry = asked, Entry(self.name, inbox)
+        self._entries.write(address, entry)
 
-    def way(self, name: str, inbox: str, lost: Callable[[LineWay], None]) -> LineWay | None:
-        """Return the way to an inbox of the process that listens at this name; None: there is none."""
-        line = self._asking.get(name)
+        def withdraw() -> None:
+            self._entries.remove(address, entry)
+            self._inboxes.pop(inbox, None)
+
+        return Withdrawal(withdraw)
+
+    def way(self, address: str, lost: Callable[[LineWay], None]) -> LineWay | None:
+        """Return the way to the component of this host that serves the address; None: there is none."""
+        entry = self._entries.read(address)
+        if entry is None:
+            return None
+        line = self._asking.get(entry.socket)
         if line is None:
             try:
-                line = HostLine(local_sockets.connect(name), self._answered, self._ended)
+                line = HostLine(local_sockets.connect(entry.socket), self._answered, self._ended)
             except (OSError, ValueError) as error:
-                log.debug("no line to %s: %s", inbox, error)
+                log.debug("no line to %s: %s", address, error)
                 return None
-            self._asking[name], self._asked[line] = line, _Asked()
-        way = LineWay(self, line, inbox, lost)
+            self._asking[entry.socket], self._asked[line] = line, _Asked()
+        way = LineWay(self, line, entry.inbox, lost)
         self._asked[line].left.append(way.leave)
         return way
 
@@ -347,7 +361,7 @@ def lines_for(directory: str) -> HostLines | None:
     if not (directory and local_sockets.IS_POSSIBLE):
         return None
     try:
-        return HostLines()
+        return HostLines(Path(directory))
     except OSError as error:
         log.warning("no lines on this host: %s", error)
         return None

@@ -186,15 +186,13 @@ class ZenohBus(LifeBus):
         self.require_open()
         reader = reader_of(accepts)
         own, inbox = key(self._mission, address, Conversation.ASK), new_inbox(self._mission, address)
-        lines = self.ways.lines
-        host = lines.name if lines is not None else ""
 
         def asked(question: Asked) -> None:
             answering = self.start(self._answer(reader, answer, question))
             answering.add_done_callback(lambda _done: question.drop())  # also if it was cancelled before it began
 
         def asked_by_query(came: zenoh.Query) -> None:
-            asked(Query(came, own, inbox, host))
+            asked(Query(came, own, inbox))
 
         def asked_directly(sample: zenoh.Sample) -> None:
             if (question := DirectQuestion.of(self._session, self._mission, sample)) is None:
@@ -203,7 +201,7 @@ class ZenohBus(LifeBus):
                 asked(question)
 
         direct = self._session.declare_subscriber(inbox, lambda sample: self.push(asked_directly, sample))
-        near = lines.serve(inbox, asked) if lines is not None else None
+        near = self.ways.lines.serve(address, inbox, asked) if self.ways.lines is not None else None
         queries = self._session.declare_queryable(own, lambda came: self.push(asked_by_query, came))
         return self._declare(Together(direct, near, queries))
 

@@ -2,8 +2,8 @@
 
 A query costs a third message and an entry in the hub's table of open queries. So the answer to a query names the inbox
 of the component that answered. From the third question on, the asker publishes its questions there, and the answers are
-published to the inbox of the asker. On one host questions and answers go over a line between the two processes instead,
-see ``host_lines``.
+published to the inbox of the asker. On one host all questions and answers go over a line between the two processes
+instead, see ``host_lines``.
 
 * An inbox belongs to one life of one component. A restarted component has another inbox, and a query finds it.
 * The hub reports whether the owner of an inbox is there. If the owner is gone, open questions end without an answer, as
@@ -39,7 +39,6 @@ MOST_WAYS = 64  # chosen: each way is a declaration at the hub; components beyon
 STILL_COME_S = 0.1  # measured: one report of an owner's end in a hundred overtakes its last answer by milliseconds
 _NUMBER = struct.Struct("<Q")
 _ANSWERED, _UNANSWERED = b"\1", b"\0"
-_ON_HOST = "\n"  # between the name of an inbox and that of its process's socket
 _EXPRESS = on_the_wire(QUALITY[Conversation.ASK])
 
 log = logging.getLogger(__name__)
@@ -147,15 +146,15 @@ class Ways:
         """Lines to other processes of this host; settable."""
         self._subscriber: zenoh.Subscriber[None] | None = None
         self._querying = Counter[str]()
-        self._answered_by: OrderedDict[str, bytes] = OrderedDict()  # address → names in the answer to the last query
+        self._answered_by: OrderedDict[str, bytes] = OrderedDict()  # address → inbox in the answer to the last query
         self._ways: dict[str, Way] = {}
 
     def way_to(self, address: str) -> Way | None:
-        """Return the way to this component, if there is one now."""
-        way = self._ways.get(address)
-        if way is None or not way.is_open or self._querying[address]:
+        """Return the way to this component, if there is one now; on this host it is found at once."""
+        if self._querying[address]:
             return None
-        return way
+        way = self._ways.get(address) or self._near_way(address)
+        return way if way is not None and way.is_open else None
 
     async def ask(self, way: Way, payload: bytes, answered: asyncio.Future[Came], within_s: float) -> Came:
         """Return the outcome of a question; None, too, if the bus is closed meanwhile."""
@@ -179,14 +178,14 @@ class Ways:
     def answered(self, address: str, attached: zenoh.ZBytes | None) -> None:
         """Record the inbox in an answer to a query; the second answer with one inbox makes a way to it."""
         called = b"" if attached is None or len(attached) > LONGEST_KEY else attached.to_bytes()
-        inbox, _line, host = called.decode(errors="replace").partition(_ON_HOST)
+        inbox = called.decode(errors="replace")
         if not is_inbox(inbox, self._mission, "asked", address):
             return
         way = self._ways.get(address)
         if way is not None and way.inbox == inbox:
             return
         if self._answered_by.pop(address, b"") == called:
-            self._make_way(address, inbox, host)
+            self._make_way(address, inbox)
             return
         self._answered_by[address] = called
         while len(self._answered_by) > MOST_WAYS:
@@ -200,14 +199,19 @@ class Ways:
             self._subscriber.undeclare()  # type: ignore[no-untyped-call]
             self._subscriber = None
 
-    def _make_way(self, address: str, inbox: str, host: str) -> None:
+    def _make_way(self, address: str, inbox: str) -> None:
         if (former := self._ways.pop(address, None)) is not None:
             former.close()
-        if len(self._ways) >= MOST_WAYS:
-            return
-        lost = partial(self._lost, address)
-        near = self.lines.way(host, inbox, lost) if self.lines is not None and host else None
-        self._ways[address] = near or self._far_way(inbox, lost)
+        if len(self._ways) < MOST_WAYS:
+            self._ways[address] = self._far_way(inbox, partial(self._lost, address))
+
+    def _near_way(self, address: str) -> Way | None:
+        if self.lines is None or len(self._ways) >= MOST_WAYS:
+            return None
+        near = self.lines.way(address, partial(self._lost, address))
+        if near is not None:
+            self._ways[address] = near
+        return near
 
     def _far_way(self, inbox: str, lost: Callable[[Way], None]) -> DirectWay:
         if self._subscriber is None:
@@ -254,13 +258,13 @@ class DirectQuestion(AnsweredByMessage):
 class Query:
     """A question that came by a query."""
 
-    def __init__(self, query: zenoh.Query, own: str, inbox: str, host: str) -> None:
-        self._query, self._own, self._called = query, own, f"{inbox}{_ON_HOST}{host}" if host else inbox
+    def __init__(self, query: zenoh.Query, own: str, inbox: str) -> None:
+        self._query, self._own, self._inbox = query, own, inbox
         self.payload = query.payload
 
     def answer(self, payload: bytes) -> None:
-        """Send the answer, and the names of the inbox and of this process's socket, for further questions."""
-        self._query.reply(self._own, payload, express=True, attachment=self._called)
+        """Send the answer, and the name of the inbox for further questions."""
+        self._query.reply(self._own, payload, express=True, attachment=self._inbox)
 
     def refuse(self, payload: bytes) -> None:
         """Send the refusal of a question that cannot be read."""

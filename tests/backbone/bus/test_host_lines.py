@@ -11,6 +11,7 @@ import socket
 import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 import uvloop
@@ -19,6 +20,7 @@ from hypothesis import strategies as st
 
 from backbone.bus import host_lines
 from backbone.bus.answers import Came, NoInbox
+from backbone.bus.host_entries import Entry, HostEntries
 from backbone.bus.host_lines import (
     MOST_AT_ONCE,
     MOST_PACKET_BYTES,
@@ -32,7 +34,7 @@ from backbone.bus.host_lines import (
 )
 from backbone.operating_system import local_sockets
 
-INBOX = "scout/direct/backbone/server/asked/000000000001"
+SERVER, INBOX = "backbone/server", "scout/direct/backbone/server/asked/000000000001"
 DEADLINE_S = 10.0
 pytestmark = pytest.mark.skipif(not local_sockets.IS_POSSIBLE, reason="this system has no such sockets")
 bodies = st.one_of(
@@ -83,21 +85,21 @@ def test_messages_that_only_begin_are_refused_however_short(monkeypatch: pytest.
 
 
 @pytest.fixture
-async def server() -> AsyncIterator[HostLines]:
-    lines = HostLines()
+async def server(tmp_path: Path) -> AsyncIterator[HostLines]:
+    lines = HostLines(tmp_path)
     yield lines
     lines.close()
 
 
 @pytest.fixture
-async def asker() -> AsyncIterator[HostLines]:
-    lines = HostLines()
+async def asker(tmp_path: Path) -> AsyncIterator[HostLines]:
+    lines = HostLines(tmp_path)
     yield lines
     lines.close()
 
 
-def way_from(asker: HostLines, name: str, lost: Callable[[LineWay], None] = lambda _way: None) -> LineWay:
-    way = asker.way(name, INBOX, lost)
+def way_from(asker: HostLines, lost: Callable[[LineWay], None] = lambda _way: None) -> LineWay:
+    way = asker.way(SERVER, lost)
     assert way is not None
     return way
 
@@ -118,8 +120,8 @@ async def test_questions_of_any_length_are_answered_in_their_order(server: HostL
         came.append(question.payload.to_bytes())
         echo(question)
 
-    server.serve(INBOX, note)
-    way = way_from(asker, server.name)
+    server.serve(SERVER, INBOX, note)
+    way = way_from(asker)
     sent = [b"", b"a", bytes(8 << 20), *(os.urandom(length) for length in range(0, 300_000, 7919))]
     assert await asyncio.gather(*(ask(way, payload) for payload in sent)) == sent
     assert came == sent
@@ -127,7 +129,7 @@ async def test_questions_of_any_length_are_answered_in_their_order(server: HostL
 
 @pytest.mark.parametrize("small", ["connect", "accept"])
 async def test_sockets_with_little_room_carry_messages_of_any_length(
-    small: str, monkeypatch: pytest.MonkeyPatch
+    small: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As where net.core.wmem_default is small; the other side's socket is as the system makes it."""
     make = getattr(local_sockets, small)
@@ -138,15 +140,15 @@ async def test_sockets_with_little_room_carry_messages_of_any_length(
         return one
 
     monkeypatch.setattr(local_sockets, small, made)
-    server, asker = HostLines(), HostLines()
+    server, asker = HostLines(tmp_path), HostLines(tmp_path)
     came: list[int] = []
 
     def note(question: HostQuestion) -> None:
         came.append(len(question.payload))
         echo(question)
 
-    server.serve(INBOX, note)
-    way, sent = way_from(asker, server.name), [os.urandom(length) for length in (0, 4_000, 9_000, 70_000, 300_000)]
+    server.serve(SERVER, INBOX, note)
+    way, sent = way_from(asker), [os.urandom(length) for length in (0, 4_000, 9_000, 70_000, 300_000)]
     try:
         assert await asyncio.gather(*(ask(way, payload) for payload in sent)) == sent
         assert came == [*map(len, sent)]
@@ -157,8 +159,8 @@ async def test_sockets_with_little_room_carry_messages_of_any_length(
 
 async def test_a_question_that_is_dropped_or_that_nobody_takes_ends(server: HostLines, asker: HostLines) -> None:
     lost: list[LineWay] = []
-    served = server.serve(INBOX, HostQuestion.drop)
-    way = way_from(asker, server.name, lost.append)
+    served = server.serve(SERVER, INBOX, HostQuestion.drop)
+    way = way_from(asker, lost.append)
     assert await ask(way, b"?") is None
     assert way.is_open
     served.undeclare()
@@ -177,26 +179,27 @@ async def test_the_end_of_a_process_ends_its_open_questions_after_the_answers_th
             echo(question)
             server.close()
 
-    server.serve(INBOX, answer)
-    way = way_from(asker, server.name, lost.append)
+    server.serve(SERVER, INBOX, answer)
+    way = way_from(asker, lost.append)
     slow, last = asyncio.create_task(ask(way, b"slow")), asyncio.create_task(ask(way, b"last"))
     assert await last == b"last"
     assert await slow is None
     assert lost == [way]
-    assert asker.way(server.name, INBOX, lost.append) is None
+    assert asker.way(SERVER, lost.append) is None
 
 
 @pytest.mark.parametrize("make_loop", [asyncio.new_event_loop, uvloop.new_event_loop], ids=["asyncio", "uvloop"])
 @pytest.mark.parametrize("when", ["before", "after"])
 @pytest.mark.parametrize("count", [1, 2 * MOST_AT_ONCE])
 def test_answers_of_a_process_that_ended_come_although_it_left_a_question_unread(
-    count: int, when: str, make_loop: Callable[[], asyncio.AbstractEventLoop]
+    count: int, when: str, make_loop: Callable[[], asyncio.AbstractEventLoop], tmp_path: Path
 ) -> None:
     """The question came before the end, or after it. The system reports its loss before it gives the answers."""
 
     async def law() -> None:
-        loop, (listening, name), asker = asyncio.get_running_loop(), local_sockets.listen(), HostLines()
-        way = way_from(asker, name)
+        loop, (listening, name), asker = asyncio.get_running_loop(), local_sockets.listen(), HostLines(tmp_path)
+        HostEntries(tmp_path).write(SERVER, Entry(name, INBOX))
+        way = way_from(asker)
         peer = local_sockets.accept(listening)
 
         async def ask_if_open(payload: bytes) -> Came:
@@ -229,11 +232,11 @@ async def test_a_peer_that_takes_nothing_costs_little(
 ) -> None:
     """Its line ends, and the others go on."""
     monkeypatch.setattr(host_lines, "MOST_WAITING_BYTES", 1 << 20)
-    server.serve(INBOX, echo)
+    server.serve(SERVER, INBOX, echo)
     deaf, closed = local_sockets.connect(server.name), select.poll()
     closed.register(deaf, select.POLLHUP)
     body = question_of(INBOX, bytes(60_000))
-    way = way_from(asker, server.name)
+    way = way_from(asker)
     for number in range(1000):
         with suppress(BlockingIOError, BrokenPipeError, ConnectionResetError):
             for packet in packets_of(number, Kind.QUESTION, body):
@@ -252,8 +255,8 @@ async def test_a_peer_that_takes_nothing_costs_little(
     ids=["short", "empty question", "no kind", "answer to nobody", "no inbox"],
 )
 async def test_nonsense_ends_its_line_alone_or_nothing(packet: bytes, server: HostLines, asker: HostLines) -> None:
-    server.serve(INBOX, echo)
-    way = way_from(asker, server.name)
+    server.serve(SERVER, INBOX, echo)
+    way = way_from(asker)
     stranger = local_sockets.connect(server.name)
     stranger.send(packet)
     for _ in range(10):
@@ -265,13 +268,13 @@ async def test_another_user_is_not_let_in_and_not_asked(
     server: HostLines, asker: HostLines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Names can be read in ``/proc/net/unix``; whoever connects is asked for its user."""
-    server.serve(INBOX, echo)
+    server.serve(SERVER, INBOX, echo)
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as stranger:
         monkeypatch.setattr(os, "geteuid", lambda: 4_000_000_000)
         stranger.connect(f"\0scout-backbone/{server.name}")
         stranger.setblocking(False)
         assert await asyncio.wait_for(asyncio.get_running_loop().sock_recv(stranger, 1), DEADLINE_S) == b""
-        assert asker.way(server.name, INBOX, lambda _way: None) is None
+        assert asker.way(SERVER, lambda _way: None) is None
 
 
 async def test_without_descriptors_a_process_waits_and_does_not_spin(
@@ -285,8 +288,8 @@ async def test_without_descriptors_a_process_waits_and_does_not_spin(
 
     monkeypatch.setattr(host_lines, "ACCEPT_AGAIN_S", 0.2)
     monkeypatch.setattr(local_sockets, "accept", refuse)
-    server.serve(INBOX, echo)
-    asked = asyncio.create_task(ask(way_from(asker, server.name), b"?"))
+    server.serve(SERVER, INBOX, echo)
+    asked = asyncio.create_task(ask(way_from(asker), b"?"))
     await asyncio.sleep(0.05)
     assert len(refusals) == 1
     monkeypatch.setattr(local_sockets, "accept", accept)
@@ -294,26 +297,31 @@ async def test_without_descriptors_a_process_waits_and_does_not_spin(
 
 
 PROGRAM = """
-import asyncio
+import asyncio, sys
+from pathlib import Path
 from backbone.bus.host_lines import HostLines
 async def main():
-    lines = HostLines()
-    lines.serve({inbox!r}, lambda question: None if question.payload == b"slow" else question.answer(b"here"))
-    print(lines.name, flush=True)
+    lines = HostLines(Path(sys.argv[1]))
+    def answer(question):
+        if question.payload != b"slow":
+            question.answer(b"here")
+    lines.serve({server!r}, {inbox!r}, answer)
+    print("ready", flush=True)
     await asyncio.Event().wait()
 asyncio.run(main())
 """
 
 
 @pytest.mark.processes
-async def test_a_stopped_process_keeps_questions_waiting_and_a_killed_one_ends_them(asker: HostLines) -> None:
-    program = await asyncio.create_subprocess_exec(
-        sys.executable, "-c", PROGRAM.format(inbox=INBOX), stdout=asyncio.subprocess.PIPE
-    )
+async def test_a_stopped_process_keeps_questions_waiting_and_a_killed_one_ends_them(
+    asker: HostLines, tmp_path: Path
+) -> None:
+    words = [sys.executable, "-c", PROGRAM.format(server=SERVER, inbox=INBOX), str(tmp_path)]
+    program = await asyncio.create_subprocess_exec(*words, stdout=asyncio.subprocess.PIPE)
     assert program.stdout is not None
     try:
-        name = (await asyncio.wait_for(program.stdout.readline(), DEADLINE_S)).decode().strip()
-        way = way_from(asker, name)
+        assert await asyncio.wait_for(program.stdout.readline(), DEADLINE_S) == b"ready\n"
+        way = way_from(asker)
         assert await ask(way, b"?") == b"here"
         program.send_signal(signal.SIGSTOP)
         waiting = asyncio.create_task(ask(way, b"?"))

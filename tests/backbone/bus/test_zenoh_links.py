@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 import zenoh
+from bus_laws import Echo, Echoed
 from free_ports import free_endpoint
+from test_zenoh_questions import echo
 
 from backbone.bus import zenoh_links
 from backbone.bus.clock import MissionClock
@@ -20,7 +22,8 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.bus.zenoh_life import LifeBus
 from backbone.keys import KEY_OF_HUB
 
-MISSION, CLIENT = "links", "ui_console/client"
+MISSION, CLIENT, RC = "links", "ui_console/client", "resource_pool/rc"
+RC_REPLY_S = 0.8  # as long as an ARC waits for its RC (resource_pool/arc_slice.py)
 NOTICED_WITHIN_S = 10.0
 LONGEST_KEEP_ALIVE = 2  # bytes, in zenoh 1.10
 
@@ -171,4 +174,28 @@ async def test_a_link_with_a_long_round_trip_stays_after_some_attempts() -> None
                     pass  # its round trip was taken for deafness
         finally:
             await bus.close()
+    await hub.close()
+
+
+async def test_a_component_of_the_same_host_answers_sooner_than_a_slow_hub_could(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A round trip of 0.4 s to the hub is 0.8 s between two of its clients: as long as an ARC waits for its RC."""
+    monkeypatch.setattr(zenoh_links, "ANSWER_WITHIN_S", 2.0)
+    endpoint, clock = free_endpoint(), MissionClock.started_now()
+    hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
+    async with a_deaf_connection_first(int(endpoint.rpartition(":")[2]), delay_s=0.2) as (port, _):
+        buses = []
+        for source in (RC, "resource_pool/arc"):
+            bus = await ZenohBus.open_when_up(MISSION, source, clock, client_config(f"tcp/127.0.0.1:{port}"))
+            bus.use_host(str(tmp_path))
+            buses.append(bus)
+        rc, arc = buses
+        rc.serve(RC, Echo, echo)
+        try:
+            for number in range(3):
+                assert (await arc.ask(RC, Echo(str(number)), Echoed, within_s=RC_REPLY_S)).text == str(number)
+        finally:
+            for bus in buses:
+                await bus.close()
     await hub.close()

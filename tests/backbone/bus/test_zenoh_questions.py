@@ -15,7 +15,7 @@ import zenoh
 from bus_laws import Echo, Echoed, TooLoud
 from free_ports import free_endpoint
 
-from backbone.bus import zenoh_questions
+from backbone.bus import host_entries, zenoh_questions
 from backbone.bus.answers import Came, NoInbox
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Answer
@@ -143,12 +143,12 @@ async def test_whoever_is_asked_beyond_the_most_ways_makes_none_change(
         assert asker.ways.way_to(SERVER) is kept
 
 
-async def test_one_who_is_asked_once_has_no_way(endpoint: str) -> None:
+async def test_a_component_that_is_asked_once_has_no_way_unless_it_is_on_this_host(endpoint: str, way: str) -> None:
     async with serving(endpoint), joined(endpoint, ASKER) as asker:
         await until_served(asker)
         assert await ask(asker, "once") == "once"
         await asyncio.sleep(0.1)  # a way would open within milliseconds
-        assert asker.ways.way_to(SERVER) is None
+        assert (asker.ways.way_to(SERVER) is None) is (way == "through the hub")
 
 
 async def test_questions_keep_their_order_over_the_change_from_queries_to_the_way(endpoint: str) -> None:
@@ -209,9 +209,24 @@ async def test_on_one_host_questions_are_answered_without_the_hub(
     at = free_endpoint()
     hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([at]))
     async with serving(at), joined(at, ASKER) as asker:
-        await on_the_way(asker)
         await hub.close()
         assert [await ask(asker, str(number)) for number in range(10)] == [str(number) for number in range(10)]
+
+
+@pytest.mark.parametrize("entry", [b"0ff\nan/inbox", b"0ff", b"a\nb\nc", b"\xff\n\xff", b"", b"\0\n\0"])
+async def test_a_component_is_asked_through_the_hub_if_its_entry_leads_to_no_process(
+    entry: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a killed process leaves it, or as no component writes it."""
+    monkeypatch.setenv("FOLDER", str(tmp_path))
+    at = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([at]))
+    async with serving(at), joined(at, ASKER) as asker:
+        [own] = [file for file in (tmp_path / host_entries.FOLDER).iterdir() if not file.name.startswith(".")]
+        own.write_bytes(entry)
+        await until_served(asker)
+        assert [await ask(asker, str(number)) for number in range(5)] == [str(number) for number in range(5)]
+    await hub.close()
 
 
 async def test_bytes_of_any_kind_end_neither_server_nor_asker(endpoint: str) -> None:
