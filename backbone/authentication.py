@@ -99,6 +99,16 @@ def is_reachable(address: str) -> bool:
         return True
 
 
+def is_of_one_link(address: str) -> bool:
+    """Return whether this IP address has a meaning only together with a network interface of one machine.
+
+    Example:
+        >>> is_of_one_link("fe80::7"), is_of_one_link("fe80::7%eth0"), is_of_one_link("fd00::7"), is_of_one_link("lab")
+        (True, True, False, False)
+    """
+    return ":" in address and ipaddress.IPv6Address(address).is_link_local
+
+
 def is_address(text: str) -> bool:
     """Return whether this is an IP address, or a host name that the system would look up.
 

@@ -9,6 +9,7 @@ import json
 import math
 import os
 import re
+import socket
 import sys
 from collections.abc import Awaitable, Callable, Iterable
 from functools import partial
@@ -21,7 +22,7 @@ from typer.main import get_command_name
 from typer.models import CommandInfo, TyperInfo
 
 from backbone import __version__
-from backbone.authentication import is_address
+from backbone.authentication import is_address, is_of_one_link
 from backbone.command_line.standard_streams import standard_streams
 from backbone.command_line.where import Where
 from backbone.command_line.wrong_words import WRONG_WORDS, is_request_for_help, refusal_of
@@ -176,14 +177,27 @@ ENDPOINT = re.compile(
 
 
 def hub_endpoint(value: str | None) -> str | None:
-    """Refuse a text that is not a hub endpoint; for options that take an endpoint."""
+    """Refuse a text that is not a hub endpoint, and number its network interface; for options that take an endpoint."""
     if value is None:
         return None
     found = ENDPOINT.fullmatch(value)
     is_right = found is not None and 0 < int(found["port"] or 1) <= MOST_PORT
-    if found is None or not is_right or not is_address((found["host"] or "").strip("[]")):
+    if found is None or not is_right or not is_address(host := (found["host"] or "").strip("[]")):
         raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
-    return value
+    return value.replace(host, _with_interface(host), 1) if is_of_one_link(host) else value
+
+
+def _with_interface(address: str) -> str:
+    """Return an address of one link with the number of its network interface, because zenoh resolves no name of one."""
+    interface = address.partition("%")[2]
+    if not interface:
+        raise typer.BadParameter(f"{address} is an address of one link; write its interface, too: [{address}%eth0]")
+    if interface.isdigit():
+        return address
+    try:
+        return address.replace(f"%{interface}", f"%{socket.if_nametoindex(interface)}")
+    except OSError:
+        raise typer.BadParameter(f"this machine has no network interface {interface}; 'ip link' lists them") from None
 
 
 def complete_mission() -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from backbone.authentication import is_address, is_loopback, is_reachable
+from backbone.authentication import is_address, is_loopback, is_of_one_link, is_reachable
 from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name, offer_name
@@ -105,6 +105,12 @@ def _check_hub_endpoint(hosts: list[Element], report: Report) -> None:
             hosts[0].place_of("address"),
             f"no other machine reaches {quoted(hosts[0].text('address'))}, and {listed(others)} must",
             f"Write the address at which they reach {hosts[0].text('name')}",
+        )
+    elif others and is_address(hub := hosts[0].text("address")) and is_of_one_link(hub):
+        report.fault(
+            hosts[0].place_of("address"),
+            f"each machine reaches {quoted(hub)} by an interface of its own",
+            "Write an address that is the same everywhere, like fd00::7 or 192.0.2.7",
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -64,12 +65,30 @@ def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(comma
 @pytest.mark.parametrize(
     "right",
     [
-        *("tcp/192.0.2.7:7447", "tcp/[::1]:7447", "tcp/[fe80::1%eth0]:7447", "tcp/lab.local:1"),
+        *("tcp/192.0.2.7:7447", "tcp/[::1]:7447", "tcp/[fe80::1%7]:7447", "tcp/lab.local:1"),
         *("tls/lab:1?prio=1-3#a=/b;c=d", "unixsock-stream//run/m/hub"),
     ],
 )
 def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
     assert hub_endpoint(right) == right
+
+
+def test_the_interface_of_an_address_of_one_link_is_numbered_because_zenoh_knows_no_names() -> None:
+    [(number, name), *_] = socket.if_nameindex()
+    assert hub_endpoint(f"tcp/[fe80::1%{name}]:7447#so_sndbuf=1") == f"tcp/[fe80::1%{number}]:7447#so_sndbuf=1"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ("tcp/[fe80::1%no-such0]:7447", "no network interface no-such0; 'ip link' lists them"),
+        ("tcp/[fe80::1]:7447", "write its interface, too: [fe80::1%eth0]"),
+    ],
+)
+def test_an_address_of_one_link_without_an_interface_of_this_machine_is_wrong_usage(wrong: str, told: str) -> None:
+    done = CliRunner().invoke(app, ["status", "--mission", "m", "--connect", wrong])
+    assert done.exit_code == 2
+    assert told in " ".join(done.output.replace("│", " ").split())
 
 
 @pytest.mark.parametrize("name", ["x" * 256, os.fsdecode(b"\xff")])
