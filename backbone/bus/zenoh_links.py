@@ -3,7 +3,7 @@
 After a cut, a new address, or a loss of many packets, a new connection of zenoh 1.10 may be *deaf*: it stays up and
 keeps itself alive, but passes no message to the client for ever. The hub declares a token, which a client finds over
 every other connection. If a client does not find it, this file ends the connection; then the session connects again by
-itself.
+itself. A connection over which more than keep-alives came is not deaf: the answer waits behind other messages.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from contextlib import suppress
 
 import zenoh
 
-from backbone.bus.sockets import set_options, shut_down
+from backbone.bus.sockets import received_bytes, set_options, shut_down
 from backbone.keys import KEY_OF_HUB
 
 log = logging.getLogger(__name__)
@@ -23,6 +23,7 @@ log = logging.getLogger(__name__)
 LOOK_EACH_S = 1.0  # chosen: the hub's token is known milliseconds after a connection, on a busy machine within 1 s
 ANSWER_WITHIN_S = 2.0  # chosen: a link without any message for this time counts as cut
 SLOWEST_ANSWER_S = 16.0  # chosen: a link with a longer round trip is of no use to a person
+KEEP_ALIVES_BYTES = 512  # chosen: several times the keep-alives of zenoh 1.10 in 16 s, two a second of four bytes each
 LOOKS = 2  # chosen: a link that loses packets may delay one answer; a deaf link is replaced 6 s after it began
 
 
@@ -37,7 +38,9 @@ class Links:
         self._session, self._loop = session, asyncio.get_running_loop()
         self._next_look: dict[int, asyncio.TimerHandle] = {}
         self._looks = not is_hub
-        self._answer_within_s = ANSWER_WITHIN_S  # doubles with each replaced link, because a slow link is not deaf
+        self._answer_within_s = (
+            ANSWER_WITHIN_S  # doubles with each replaced or busy link, because a slow link is not deaf
+        )
         self._token = session.liveliness().declare_token(KEY_OF_HUB) if is_hub else None
         changed = zenoh.handlers.Callback(self._changed, indirect=False)
         self._listener = session.info.declare_link_events_listener(changed, history=True)
@@ -72,22 +75,31 @@ class Links:
     def _look(self, port: int, looks_left: int) -> None:
         """Ask the hub for its token; if there is no answer, ask again or end the connection."""
         found: list[zenoh.Reply] = []
+        most_bytes = received_bytes(port) + KEEP_ALIVES_BYTES
 
         def ended() -> None:
             if any(reply.ok for reply in found):  # the end of the time is a reply, too
                 self._answer_within_s = ANSWER_WITHIN_S
             else:
-                self._call_soon(self._found_nothing, port, looks_left)
+                self._call_soon(self._found_nothing, port, looks_left, most_bytes)
 
         answers = zenoh.handlers.Callback(found.append, ended, indirect=False)
         self._session.liveliness().get(KEY_OF_HUB, answers, timeout=self._answer_within_s)
 
-    def _found_nothing(self, port: int, looks_left: int) -> None:
+    def _found_nothing(self, port: int, looks_left: int, most_bytes: int) -> None:
+        """Look again or end the connection; ``most_bytes`` are those that a deaf link has received by now."""
         if port not in self._next_look:  # this connection has ended
             return
-        if looks_left:
+        is_busy = self._answer_within_s < SLOWEST_ANSWER_S and received_bytes(port) > most_bytes
+        if is_busy:
+            self._answer_longer()
+            self._look_later(port, looks_left + 1)
+        elif looks_left:
             self._look_later(port, looks_left)
         else:
             log.warning("the link from port %d to the hub passes no messages, so it is made anew", port)
-            self._answer_within_s = min(2 * self._answer_within_s, SLOWEST_ANSWER_S)
+            self._answer_longer()
             shut_down(port)
+
+    def _answer_longer(self) -> None:
+        self._answer_within_s = min(2 * self._answer_within_s, SLOWEST_ANSWER_S)

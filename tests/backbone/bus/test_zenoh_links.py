@@ -20,12 +20,13 @@ from backbone.bus.shared_bus import SharedSession
 from backbone.bus.sockets import MOST_UNSENT_BYTES
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.bus.zenoh_life import LifeBus
-from backbone.keys import KEY_OF_HUB
+from backbone.keys import KEY_OF_HUB, Conversation
 
 MISSION, CLIENT, RC = "links", "ui_console/client", "resource_pool/rc"
 RC_REPLY_S = 0.8  # as long as an ARC waits for its RC (resource_pool/arc_slice.py)
 NOTICED_WITHIN_S = 10.0
 LONGEST_KEEP_ALIVE = 2  # bytes, in zenoh 1.10
+SHORTEST_PICTURE = 1000  # bytes; answers are shorter
 
 
 @pytest.fixture(autouse=True)
@@ -78,7 +79,9 @@ async def test_a_link_without_messages_is_replaced_until_messages_pass(shared: b
 
 @asynccontextmanager
 async def a_deaf_connection_first(hub_port: int, delay_s: float = 0.0) -> AsyncIterator[tuple[int, asyncio.Event]]:
-    """Give a port through which a hub is reached, and what makes the first connection pass keep-alives only.
+    """Give a port through which a hub is reached, and what keeps the answers of the first connection back.
+
+    Keep-alives and pictures pass it.
 
     Args:
         delay_s: Of each message on its way.
@@ -90,7 +93,8 @@ async def a_deaf_connection_first(hub_port: int, delay_s: float = 0.0) -> AsyncI
             while True:
                 length = await reader.readexactly(2)
                 batch = await reader.readexactly(int.from_bytes(length, "little"))
-                if len(batch) <= LONGEST_KEEP_ALIVE or not (may_be_deaf and is_deaf.is_set()):
+                is_other = not LONGEST_KEEP_ALIVE < len(batch) < SHORTEST_PICTURE
+                if is_other or not (may_be_deaf and is_deaf.is_set()):
                     asyncio.get_running_loop().call_later(delay_s, writer.write, length + batch)
         except (asyncio.IncompleteReadError, ConnectionError):
             writer.close()
@@ -122,6 +126,29 @@ async def test_a_link_that_only_keeps_itself_alive_is_replaced() -> None:
             assert await changes(bus, 3) == [True, False, True]
             assert await changes(bus, 2, within_s=0.5) == [True]
         finally:
+            await bus.close()
+    await hub.close()
+
+
+async def test_a_link_over_which_pictures_come_stays_although_answers_are_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_links, "ANSWER_WITHIN_S", 0.4)
+    endpoint, clock = free_endpoint(), MissionClock.started_now()
+    hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
+
+    async def send_pictures() -> None:
+        while True:
+            hub.publish(RC, Conversation.FRAMES, Echo("x" * 2 * SHORTEST_PICTURE))
+            await asyncio.sleep(0.01)
+
+    async with a_deaf_connection_first(int(endpoint.rpartition(":")[2])) as (port, is_deaf):
+        bus = await ZenohBus.open_when_up(MISSION, CLIENT, clock, client_config(f"tcp/127.0.0.1:{port}"))
+        is_deaf.set()
+        bus.subscribe(RC, Conversation.FRAMES, Echo, lambda _picture: None)
+        sending = asyncio.create_task(send_pictures())
+        try:
+            assert await changes(bus, 2, within_s=3.0) == [True]  # without pictures it is replaced after 1 s
+        finally:
+            sending.cancel()
             await bus.close()
     await hub.close()
 
