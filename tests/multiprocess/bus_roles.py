@@ -1,16 +1,18 @@
-"""A hub, a crowd of components, and one that asks the hub, each a process for one machine of a test.
+"""A hub and components that ask it, answer, or send pictures, each a process for one machine of a test.
 
-``bus_roles.py hub|crowd|asker ENDPOINT NUMBER``
+``bus_roles.py hub|crowd|asker|cameras|watcher ENDPOINT NUMBER``
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import json
 import os
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +24,7 @@ from backbone.keys import Conversation
 from backbone.operating_system.lingering import ignore_lingering
 from backbone.rc_manager.messages import Beat, Done, SetIdle
 from backbone.wire import Envelope, Message
+from resource_pool.messages import Frame
 
 if TYPE_CHECKING:
     from namespaces import NetworkHost
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 MISSION, HUB, BEAT_EVERY_S, ASKED_EVERY_S = "cable", "backbone/hub", 0.05, 0.05
 CROWD = 16  # more than the threads through which a hub receives
 ANSWERED_WITHIN_S = 1.0  # as long as an answer may take on a busy machine
+NARROW_ANSWERED_WITHIN_S = 10.0  # behind pictures, on a link that loses what it cannot pass
+CAMERAS, WIDTH_PX, HEIGHT_PX, FRAME_EVERY_S = ("left", "right"), 320, 240, 0.125
 
 
 def member(number: int) -> str:
@@ -40,9 +45,9 @@ async def answer(_asked: Envelope[Any]) -> Message:
     return Done()
 
 
-async def is_answered(bus: ZenohBus, address: str) -> bool:
+async def is_answered(bus: ZenohBus, address: str, within_s: float = ANSWERED_WITHIN_S) -> bool:
     try:
-        await bus.ask(address, SetIdle("arc", True), Done, within_s=ANSWERED_WITHIN_S)
+        await bus.ask(address, SetIdle("arc", True), Done, within_s=within_s)
     except LinkError:
         return False
     return True
@@ -93,6 +98,40 @@ async def asker(endpoint: str, number: int) -> None:
     await bus.close()
 
 
+async def cameras(endpoint: str, _number: int) -> None:
+    """Be two cameras, until killed."""
+    bus = await ZenohBus.open_when_up(
+        MISSION, "resource_pool/grabber", MissionClock.started_now(), client_config(endpoint)
+    )
+    say("ready")
+    for number in itertools.count():
+        pixels = os.urandom(WIDTH_PX * HEIGHT_PX)
+        for arc in CAMERAS:
+            frame = Frame("grabber", arc, 1, "scout", number, 0.0, WIDTH_PX, HEIGHT_PX, pixels)
+            bus.publish(f"resource_pool/{arc}", Conversation.FRAMES, frame)
+        await asyncio.sleep(FRAME_EVERY_S)
+
+
+async def watcher(endpoint: str, _number: int) -> None:
+    """Get the cameras' pictures and ask the hub until a line comes; then say what came, and how often no link was."""
+    bus = await ZenohBus.open_when_up(
+        MISSION, "mission_control/watch", MissionClock.started_now(), client_config(endpoint)
+    )
+    count = Counter[str]()
+    bus.watch_link(lambda up: count.update([] if up else ["cut"]))
+    for arc in CAMERAS:
+        at = f"resource_pool/{arc}"
+        bus.subscribe(at, Conversation.FRAMES, Frame, lambda _frame: count.update(["pictures"]), latest=True)
+    line = asyncio.get_running_loop().run_in_executor(None, sys.stdin.readline)
+    say("ready")
+    while not line.done():
+        count["asked"] += 1
+        count["unanswered"] += not await is_answered(bus, HUB, NARROW_ANSWERED_WITHIN_S)
+        await asyncio.sleep(ASKED_EVERY_S)
+    say(json.dumps(count))
+    await bus.close()
+
+
 def say(line: str) -> None:
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
@@ -116,4 +155,5 @@ def said_by(process: subprocess.Popen[str]) -> str:
 
 
 if __name__ == "__main__":
-    asyncio.run({"hub": hub, "crowd": crowd, "asker": asker}[sys.argv[1]](sys.argv[2], int(sys.argv[3])))
+    roles = {"hub": hub, "crowd": crowd, "asker": asker, "cameras": cameras, "watcher": watcher}
+    asyncio.run(roles[sys.argv[1]](sys.argv[2], int(sys.argv[3])))

@@ -15,6 +15,7 @@ from poor_link import PoorDirection, Weather
 
 LEASE_S = 2.0
 BACK_WITHIN_S = 15.0
+PICTURES_FOR_S = 15.0  # with batches of 64 KiB, the link was lost every 2 s to 3 s
 POOR_FOR_S = 12.0  # three attempts to connect again, each of which the hub gives up after 2 s
 
 
@@ -77,3 +78,23 @@ def test_a_poor_link_stops_no_one_else_and_makes_no_one_deaf(tmp_path: Path, wea
         assert meanwhile["unanswered"] == 0, meanwhile
         assert meanwhile["asked"] > 10 * (POOR_FOR_S - LEASE_S), meanwhile
         assert json.loads(said_by(asker)) == {"deaf": []}
+
+
+@pytest.mark.processes
+@pytest.mark.timeout(120)
+@pytest.mark.thorough
+def test_a_process_that_gets_more_pictures_than_its_link_passes_keeps_the_link(tmp_path: Path) -> None:
+    with contextlib.ExitStack() as stack:
+        hosts = stack.enter_context(hosts_on_a_switch(tmp_path, "base", "far", poor=["far"]))
+        base, far, endpoint = hosts["base"], hosts["far"], f"tcp/{hosts['base'].address}:7447"
+        stack.enter_context(playing("hub", base, endpoint))
+        watcher = stack.enter_context(playing("watcher", far, endpoint))
+        far.change_weather(Weather(rate_bit_s=256e3))
+        stack.enter_context(playing("cameras", base, endpoint))
+        time.sleep(PICTURES_FOR_S)
+        print(file=watcher.stdin, flush=True)
+        count = json.loads(said_by(watcher))
+        assert count["asked"] > 1, count
+        assert count["unanswered"] == 0, count
+        assert count.get("cut", 0) == 0, count
+        assert count["pictures"] > 0, count
