@@ -61,7 +61,7 @@ class Gate:
         if not self.is_open:
             because = f" because of {self.by}" if self.by else ""
             raise SwappedOut(
-                f"{self.arc} holds nothing now: {self.reason}{because}",
+                f"{self.arc} holds nothing now; the last reason: {self.reason}{because}",  # others may have come since
                 reason=self.reason,
                 by=self.by,
                 expected_start_s=self.expected_s,

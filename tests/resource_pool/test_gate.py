@@ -68,3 +68,14 @@ def test_a_shut_gate_says_why_by_whom_and_until_when() -> None:
         gate.epoch_of("scout")
     assert refused.value.facts == {"reason": "higher", "by": "console1", "expected_start_s": 42.0}
     assert "console1" in str(refused.value)
+
+
+def test_a_refusal_does_not_claim_that_the_reason_of_the_last_end_holds_now() -> None:
+    """The other ARC may have ended since, and the robot may be out of reach; only the RC manager knows."""
+    gate = Gate("anna-drive")
+    gate.prepare({"scout": 1})
+    gate.open({"scout": 1}, 1.0)
+    gate.close("higher", "watch", -1.0)
+    with pytest.raises(SwappedOut) as refused:
+        gate.epoch_of("scout")
+    assert refused.value.detail == "anna-drive holds nothing now; the last reason: higher because of watch"
