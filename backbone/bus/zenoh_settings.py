@@ -14,8 +14,8 @@ LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses
 HOST_LEASE_MS = 24_000  # chosen: a unix socket cannot be cut, and a creator replaces a hung process after 3 s
 HOST_BATCH_BYTES = 65_535  # zenoh 1.10: the most
 LINK_BATCH_BYTES = 16_384  # chosen: over 256 kbit/s half a second, so a batch of a picture leaves time for three others
-_LINK_QUEUES = dict.fromkeys(("real_time", "interactive_high", "data_high", "data", "background"), 8)
-"""Batches of each priority but that of pictures: as many bytes as two of 64 KiB, so a burst finds as much room."""
+_LINK_QUEUES = dict.fromkeys(("real_time", "interactive_high", "data_high", "data", "data_low", "background"), 8)
+"""Batches of each priority: as many bytes as two of 64 KiB, so a burst or a picture finds as much room."""
 KEEP_ALIVES = 4  # chosen: in each lease, so that three may be late
 RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
 OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine listens within this time
