@@ -139,8 +139,6 @@ async def _run(own: Launch, clock: MissionClock, launcher: Launcher, recorder: M
         loop.add_signal_handler(number, launcher.end, number.name)
     loop.add_signal_handler(signal.SIGINT, launcher.interrupted)
     try:
-        if recorder is not None:
-            await recorder.begin()
         await run_with_heartbeat(own, clock, launcher.run(), lambda: launcher.feedback or str(launcher.state))
     except BackboneError as error:
         launcher.outcome.failure = launcher.outcome.failure or error

@@ -8,6 +8,7 @@ import logging
 import signal
 import time
 from collections.abc import AsyncIterator, Callable
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -112,7 +113,7 @@ class Launcher(Component[NoParameters]):
             note=self.story.note,
         )
         self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
-        self._hand_recorders = HandRecorderWatch(bus, clock, self._is_deaf, self._hand_recorder_changed)
+        self._hand_recorders = HandRecorderWatch(bus, clock, self._is_deaf, self._recorder_changed)
         self._log = LogKeeper(bus)
         self.outcome = Outcome()
         self._others_changed = asyncio.Event()
@@ -124,7 +125,13 @@ class Launcher(Component[NoParameters]):
         keeper.on_bug = self.fail
 
     async def connect(self) -> None:
-        """Start the core services in order; start each when the one before is ready."""
+        """Start the recorder, then the core services in order; start each when the one before is ready."""
+        self.start_task(self._health_watch.run(), "health")
+        if self._recorder is not None:
+            self._recorder.on_changed = partial(self._recorder_changed, self._description.name)
+            async with self._step("recorder"):
+                await self._recorder.begin()
+            self.start_task(self._recorder.keep(), "recorder")
         for launch in core_launches(self._description, self.launch, self._options):
             async with self._step(launch.name):
                 await self._keeper.start(launch, CORE_POLICY, READY_WITHIN_S)
@@ -132,12 +139,8 @@ class Launcher(Component[NoParameters]):
         self._tree.watch()
 
     async def serve(self) -> None:
-        """Start the mission through the placer and keep it running; publish its health."""
-        self.start_task(self._health_watch.run(), "health")
+        """Start the mission through the placer and keep it running."""
         self.start_task(self._hand_recorders.run(), "recorders by hand")
-        if self._recorder is not None:
-            self._recorder.on_changed = self._recorder_changed
-            self.start_task(self._recorder.keep(), "recorder")
         if self.launch.run_directory:
             folder = Path(self.launch.run_directory)
             self.start_task(NamesKeeper(self.bus, self.clock, folder).run(), "names")
@@ -162,11 +165,7 @@ class Launcher(Component[NoParameters]):
     def _newest(self, order: Start) -> Start:
         return self._tree.newest(order)
 
-    def _recorder_changed(self, line: str) -> None:
-        self.publish_event(self._description.name, line, LogLevel.WARNING)
-        self.changed()
-
-    def _hand_recorder_changed(self, name: str, what: str) -> None:
+    def _recorder_changed(self, name: str, what: str) -> None:
         self.publish_event(name, what, LogLevel.WARNING)
         self.changed()
 

@@ -113,6 +113,8 @@ class MissionRecorder:
         Raises:
             RecorderFailed: The recorder did not begin; the detail has the reason.
         """
+        if self._absence is None:
+            self._absence = Absence(NAME, self._clock.now_s(), "it does not listen yet", "components here wait for it")
         self._reading = None
         try:
             self._process = process = await self._started()
@@ -131,6 +133,7 @@ class MissionRecorder:
             raise RecorderFailed(f"the recorder did not begin: {said or 'it ended without a word'}")
         assert process.stdout is not None  # noqa: S101  a pipe
         self._watching = asyncio.create_task(watch(process.stdout, self._silent), name="whether the recorder responds")
+        self._absence = None
 
     async def keep(self) -> None:
         """Start the recorder again whenever it has ended, until cancelled."""
@@ -157,7 +160,6 @@ class MissionRecorder:
                 rest_s = min(2.0 * rest_s, AGAIN_AT_LEAST_EACH_S)
                 self._lost(error.detail, f"it is tried again in {rest_s:g} s", error.remedy)
             else:
-                self._absence = None
                 self.on_changed("the recording goes on")
                 return
 

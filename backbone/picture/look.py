@@ -13,7 +13,7 @@ import msgspec
 
 from backbone.addresses import COMPONENT_DATABASE, LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.interface import Bus
-from backbone.component.messages import Absence, AskTime, MissionTime
+from backbone.component.messages import Absence, AskTime, LifeState, MissionTime
 from backbone.component_database.messages import ListTypes, TypeCount, Types
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import ListProcesses, Processes, ProcessState
@@ -77,6 +77,9 @@ async def look(
         if not isinstance(said, Absence | MissionTime):
             picture.take(said)
     silent = [said for said in answers if isinstance(said, Absence)]
+    if any(one.address == LAUNCHER and one.state is LifeState.CONNECTING for one in listing.components):
+        start = Absence(bus.mission, 0.0, "not all of it is ready", "its launcher starts the services", is_start=True)
+        silent = [start, *(absence for absence in silent if not absence.vital)]
     kept = picture.processes.values()
     lacks = _lacks(listing, kept)
     picture.problems = (*(f"{absence.name}: {absence.cause}" for absence in silent), *lacks)

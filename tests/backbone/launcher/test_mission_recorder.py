@@ -71,6 +71,9 @@ async def test_one_whose_first_begin_is_broken_off(tmp_path: Path, monkeypatch: 
     recorder = played(tmp_path, "", monkeypatch)
     beginning = asyncio.create_task(recorder.begin())
     await until_it_hangs(tmp_path)
+    absent = recorder.absence()
+    assert absent is not None, "the start waits for it"
+    assert absent.cause == "it does not listen yet"
     await end_tasks(beginning)
     try:
         await recorder.end()
