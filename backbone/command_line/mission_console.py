@@ -72,6 +72,10 @@ class ConsoleObserver:
         self._is_up, self._last_progress_s = False, 0.0
         self._waits_for: list[str] = []
 
+    def comes_up(self, mission: str) -> None:
+        """Print the first line."""
+        self.tell(f"mission {mission} comes up")
+
     def began(self, step: str) -> None:
         """Print nothing, because ``Outcome.failure`` names a step that hangs."""
 
@@ -240,7 +244,6 @@ def _lines_are_missing(output: TerminalOutput | None) -> None:
 
 
 async def _bring_up(description: MissionDescription, options: UpOptions, observer: ConsoleObserver) -> int:
-    observer.tell(f"mission {description.name} comes up")
     try:
         outcome = await run_mission(description, options, observer)
     except (Refusal, LinkError) as error:

@@ -65,6 +65,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
         endpoint = prepare_endpoint(description, directory)
         clock = MissionClock(began_s, options.speed)
         own = launcher_launch(description, endpoint, clock, directory)
+        observer.comes_up(description.name)
         observer.began("nameserver")
         zygote = await Zygote.spawn_fresh(run_directory=str(directory))
         try:

@@ -62,6 +62,9 @@ class Outcome:
 class BringUpObserver(Protocol):
     """Shows a mission's bring-up, run and end to a person."""
 
+    def comes_up(self, mission: str) -> None:
+        """Show that this mission comes up: every precondition holds. Called once, before the first step."""
+
     def began(self, step: str) -> None:
         """Show that this step has begun."""
 

@@ -64,6 +64,8 @@ def run_supervised(seed: int, *, chaos: bool, faults: Sequence[SupervisionFault]
 class _Observer:
     """Shows nothing, because the audit has all events."""
 
+    def comes_up(self, mission: str) -> None: ...
+
     def began(self, step: str) -> None:
         """Do nothing."""
 

@@ -30,6 +30,9 @@ FAR = Host(name="far", address="192.0.2.7")
 class Nobody:
     """Watches a mission that must not begin."""
 
+    def comes_up(self, mission: str) -> None:
+        raise AssertionError(f"{mission} comes up")
+
     def began(self, step: str) -> None:
         raise AssertionError(f"{step} began")
 
@@ -103,6 +106,7 @@ def test_the_command_ends_with_4_and_names_the_trace_once(tmp_path: Path) -> Non
     assert done.exit_code == 4
     assert "run.trace" in done.output
     assert done.output.count(str(bad)) == 1
+    assert "comes up" not in done.output, "it was refused before"
 
 
 def test_a_port_that_is_taken_or_an_address_that_is_anothers(shipped: MissionDescription, short_path: Path) -> None:
