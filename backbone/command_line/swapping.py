@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Collection, Iterable
 from uuid import uuid4
 
@@ -29,7 +30,7 @@ from backbone.exchange import (
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.operators import OperatorAction, publish_action
-from backbone.nameserver.messages import Components, ListComponents
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved
 from backbone.naming import Subsystem, address, component_of, did_you_mean
 from backbone.picture.reasons import stopped_unit
 from backbone.placer.messages import ListPlacements, Placements
@@ -77,6 +78,7 @@ async def swapped_by(bus: Bus, clock: Clock, at: str, question: SwapModule | Swa
     """Return the answer; if the link breaks before it arrives, ask for it again.
 
     Raises:
+        Refusal: It refused; if the class cannot be imported there, the detail names the host.
         UnknownExchange: The component was started again meanwhile.
         LinkError: It does not answer.
     """
@@ -87,6 +89,12 @@ async def swapped_by(bus: Bus, clock: Clock, at: str, question: SwapModule | Swa
         say(f"waiting for {component_of(at)}, which ended or was cut off: {broken}")
         again = msgspec.structs.replace(question, is_repeated=True)
         return await ask_until_answered(bus, clock, at, again, Swapped, each_s=within_s, within_s=AGAIN_WITHIN_S)
+    except Refusal as refusal:
+        if "class_path" in refusal.facts:
+            with contextlib.suppress(LinkError, Refusal):
+                there = await bus.ask(NAMESERVER, Resolve(component_of(at)), Resolved, within_s=REPLY_TIME_S)
+                refusal.detail = f"on host {there.component.host}: {refusal.detail}"
+        raise
 
 
 def result_line(asked: SwapModule, swapped: Swapped, counts: str) -> str:

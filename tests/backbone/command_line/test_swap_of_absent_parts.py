@@ -10,7 +10,7 @@ import pytest
 from backbone.addresses import LAUNCHER, NAMESERVER, PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
-from backbone.command_line.swapping import addressed
+from backbone.command_line.swapping import addressed, swapped_by
 from backbone.component.messages import (
     Absence,
     AskParameters,
@@ -23,8 +23,9 @@ from backbone.component.messages import (
 from backbone.errors import Refusal
 from backbone.exchange import Silent, SwapModule, UnknownModule
 from backbone.mission.model import EXECUTION_UNIT
-from backbone.nameserver.messages import Components, ListComponents
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.placer.messages import AskDeclared, DeclaredOrder, ListPlacements, Placement, Placements, Start
+from backbone.reading_anew import WrongClass
 from backbone.wire import Envelope, Message
 
 
@@ -111,6 +112,32 @@ def test_a_part_on_a_host_that_cannot_be_reached_is_not_called_a_process_that_ha
         with pytest.raises(Silent) as caught:
             await addressed(bus, SwapModule("rover", "pair:Smoothing"))
         assert re.search(told, str(caught.value))
+        await bus.close()
+
+    run_virtual(scene())
+
+
+@pytest.mark.parametrize("knows_it", [True, False])
+def test_a_class_that_a_host_lacks_is_refused_with_the_name_of_the_host(knows_it: bool) -> None:
+    unit = "mission_control/waves"
+
+    async def refuse(_asked: Envelope[Message]) -> Message:
+        raise WrongClass("pair:Smoothing: No module named 'pair'", class_path="pair:Smoothing")
+
+    async def resolve(_asked: Envelope[Message]) -> Message:
+        if not knows_it:
+            raise UnknownName("waves has left")
+        return Resolved(ComponentState(unit, EXECUTION_UNIT, "far", 1, LifeState.READY, 0.0))
+
+    async def scene() -> None:
+        clock = VirtualClock()
+        bus = LocalNetwork("m").join(NAMESERVER, clock)
+        bus.serve(NAMESERVER, Resolve, resolve)
+        bus.serve(unit, SwapModule, refuse)
+        with pytest.raises(WrongClass) as caught:
+            await swapped_by(bus, clock, unit, SwapModule("smoothing", "pair:Smoothing"), within_s=5.0)
+        told = "on host far: " if knows_it else ""
+        assert str(caught.value).startswith(f"{told}pair:Smoothing: No module named 'pair' (")
         await bus.close()
 
     run_virtual(scene())
