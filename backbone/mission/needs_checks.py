@@ -9,6 +9,8 @@ from backbone.mission.report import Report, listed, quoted
 from backbone.mission.tables import Tables, is_known, role_of
 from backbone.naming import Subsystem, is_legal
 
+NO_CLASS_YET = "backbone.component.component:Component"  # stands for a class that is not written yet: it does nothing
+
 
 def check_replaced(component_type: Element, tables: Tables, report: Report) -> None:
     """Report a type of the file's own that has the name of shipped hardware and is none."""
@@ -58,10 +60,10 @@ def check_commands(component_type: Element, tables: Tables, report: Report) -> N
 
 
 def check_roles(component_type: Element, tables: Tables, report: Report) -> None:
-    """Report needs that are not the roles of the ARC's class: the class decides which RCs the ARC gets."""
+    """Report needs that are not the roles of the class, which decides which RCs an ARC gets; only an ARC has roles."""
     name = component_type.text("name")
     facts, needs = tables.facts_of(name), tables.needs(name)
-    if facts is not None and facts.roles and needs != facts.roles:
+    if facts is not None and needs != facts.roles and component_type.text("class") != NO_CLASS_YET:
         written = [
             f'<needs type="{kind}"/>' if role == kind else f'<needs role="{role}" type="{kind}"/>'
             for role, kind in facts.roles.items()
@@ -69,7 +71,9 @@ def check_roles(component_type: Element, tables: Tables, report: Report) -> None
         report.fault(
             component_type.place_of("class"),
             f"type {name} needs {_in_words(needs)}, and its class {_in_words(facts.roles)}",
-            f"Write {''.join(written)}, or change roles of the class",
+            f"Write {''.join(written)}, or change roles of the class"
+            if written
+            else "Remove <needs>, or name the class of an ARC; its roles are what it needs",
         )
 
 

@@ -99,3 +99,23 @@ def test_needs_that_are_not_the_roles_of_the_class_are_refused(tmp_path: Path, n
     assert fault.message == f"type own {told}, and its class lamp"
     assert fault.remedy == 'Write <needs type="lamp"/>, or change roles of the class'
     assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith("class=")
+
+
+@pytest.mark.parametrize(
+    "class_path",
+    ["resource_pool.rcs.skeleton:Lamp", "mission_control.behaviors.wait:Wait"],
+    ids=["an RC", "a behavior"],
+)
+def test_a_type_with_needs_whose_class_is_no_arc_is_refused_by_check(tmp_path: Path, class_path: str) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text(
+        '<mission name="m" priority="1"><types>\n'
+        f'<type name="own" class="{class_path}" subsystem="resource_pool"><needs type="scout"/></type>\n'
+        "</types></mission>"
+    )
+    with pytest.raises(MissionInvalid) as caught:
+        read_mission(file)
+    [fault] = caught.value.faults
+    assert fault.message == "type own needs scout, and its class nothing"
+    assert fault.remedy == "Remove <needs>, or name the class of an ARC; its roles are what it needs"
+    assert (fault.line, fault.column) == (2, 18)
