@@ -57,6 +57,15 @@ def require_new(path: Path) -> None:
     """
     if path.exists():
         raise RecorderFailed(f"{path} exists")
+    require_writable(path)
+
+
+def require_writable(path: Path) -> None:
+    """Return if this user may write in the folder of this file, else raise.
+
+    Raises:
+        RecorderFailed: This user may not, or there is no such folder.
+    """
     if not os.access(path.absolute().parent, os.W_OK):
         raise RecorderFailed(f"{path.absolute().parent} cannot be written")
 
@@ -135,9 +144,19 @@ class MissionRecorder:
         self._watching = asyncio.create_task(watch(process.stdout, self._silent), name="whether the recorder responds")
         self._absence = None
 
+    async def begin_or_be_lost(self) -> None:
+        """Start the recorder; return when it listens, or when it did not begin. ``keep`` then starts it again."""
+        try:
+            await self.begin()
+        except RecorderFailed as error:
+            self._lost(error.detail, "it is tried again", error.remedy)
+
     async def keep(self) -> None:
-        """Start the recorder again whenever it has ended, until cancelled."""
-        while self._process is not None:
+        """Start the recorder again whenever it does not run, until cancelled."""
+        while True:
+            if self._process is None:
+                await self._begin_again()
+            assert self._process is not None  # noqa: S101  it was begun
             process, last = self._process, await self._ended()
             if process.returncode != ExitCode.REFUSED:
                 self._lost(last, "the recording goes on in a further file")

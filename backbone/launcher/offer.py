@@ -79,20 +79,21 @@ class MachineOffer(Component[NoParameters]):
         creator: KeptCreator,
         on_ready: Callable[[], None],
         recorder: MissionRecorder | None = None,
+        say: Callable[[str], None] = lambda _line: None,
     ) -> None:
         super().__init__(launch, bus, clock)
-        self._creator, self._on_ready, self._recorder = creator, on_ready, recorder
+        self._creator, self._on_ready, self._recorder, self._say = creator, on_ready, recorder, say
         creator.on_fell, creator.on_changed = self._creator_fell, self.changed
         self._link_up, self._link_fell = asyncio.Event(), asyncio.Event()
         self._wrong_clock: Absence | None = None
         self.ending = Ending.ORDERED
 
     async def connect(self) -> None:
-        """Start the recorder, then the creator; if the link is lost meanwhile, end."""
+        """Start the recorder, then the creator, also if the recorder did not begin; end if the link is lost."""
         self.start_task(self._watch_link(), "link")
         if self._recorder is not None:
-            await self._recorder.begin()
             self._recorder.on_changed = self._recorder_changed
+            await self._recorder.begin_or_be_lost()
             self.start_task(self._recorder.keep(), "recorder")
         await self._creator.start(self.bus, self.clock)
 
@@ -119,6 +120,7 @@ class MachineOffer(Component[NoParameters]):
         await self._creator.close()
 
     def _recorder_changed(self, line: str) -> None:
+        self._say(line)
         self.publish_event(self.name, line, LogLevel.WARNING)
         self.changed()
 
@@ -279,7 +281,7 @@ class Offering:
                 f"a hub listens at {offered.endpoint} and does not let this machine in: the secret is missing or not "
                 "the mission's (--secret-file), or the hub is just starting"
             ) from error
-        offer = self._current = MachineOffer(launch, bus, clock, creator, self._is_in_the_mission, recorder)
+        offer = self._current = MachineOffer(launch, bus, clock, creator, self._is_in_the_mission, recorder, self._say)
         try:
             await offer.run()
         finally:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ import pytest
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock, LinkListener, Subscription
 from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.command_line.offering import offer_this_machine
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, AskState, ComponentState, Stop, Stopping
 from backbone.component.name_claim import claim_name
@@ -29,9 +31,11 @@ from backbone.creator.messages import (
     creator_name,
     offer_name,
 )
+from backbone.launcher import mission_recorder
 from backbone.launcher import offer as offers
 from backbone.launcher.kept_creator import Offered
 from backbone.launcher.mission_connection import mission_clock
+from backbone.launcher.mission_recorder import MissionRecorder, RecorderFailed
 from backbone.launcher.offer import Ending, MachineOffer, Offering
 from backbone.naming import Subsystem
 from backbone.run_files import RunFolderUnusable
@@ -109,7 +113,7 @@ def on_a_cable(local_mission: Callable[..., Any], monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(offers, "CUT_OFF_S", CUT_OFF_S)
 
     @asynccontextmanager
-    async def scene(creator: FakeCreator | None = None, *, behind_s: float = 0.0) -> AsyncIterator[Scene]:
+    async def scene(creator: FakeCreator | None = None, *, behind_s: float = 0.0, **more: Any) -> AsyncIterator[Scene]:
         clock = MissionClock.started_now()
         async with local_mission(clock=clock) as network:
             own = MissionClock(clock.origin_monotonic_s + behind_s)
@@ -119,7 +123,7 @@ def on_a_cable(local_mission: Callable[..., Any], monkeypatch: pytest.MonkeyPatc
             ready = asyncio.Event()
             bus, kept = BusOnACable(network, launch.address, own), creator or FakeCreator()
             tester = network.join("ui_console/tester", clock)
-            it = MachineOffer(launch, bus, own, kept, ready.set)
+            it = MachineOffer(launch, bus, own, kept, ready.set, **more)
             life = asyncio.create_task(it.run())
             if not kept.never_ready:
                 await asyncio.wait_for(ready.wait(), WITHIN_S)
@@ -212,6 +216,42 @@ async def test_a_link_that_is_lost_before_the_creator_is_ready_ends_the_wait(on_
         await asyncio.wait_for(scene.creator.began.wait(), WITHIN_S)
         scene.bus.link_changed(False)
         assert await scene.ends() is Ending.CUT_OFF
+
+
+@pytest.mark.processes
+async def test_a_machine_whose_recorder_does_not_begin_in_time_is_offered_and_recorded_later(
+    on_a_cable: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script, begins, said, goes_on = tmp_path / "recorder", tmp_path / "begins", list[str](), asyncio.Event()
+
+    def say(line: str) -> None:
+        said.append(line)
+        if line == "the recording goes on":
+            goes_on.set()
+
+    script.write_text(f"#!/bin/sh\ntest -e {begins} && echo records to far.mcap >&2\nexec sleep 60\n")
+    script.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(script))
+    monkeypatch.setattr(mission_recorder, "BEGUN_WITHIN_S", 0.3)
+    monkeypatch.setattr(mission_recorder, "AGAIN_AFTER_S", 0.05)
+    recorder = MissionRecorder("night", tmp_path / "far.mcap", MissionClock.started_now(), [])
+    try:
+        async with on_a_cable(recorder=recorder, say=say) as scene:
+            assert scene.creator.runs
+            [line] = said
+            assert line.startswith("lost its recorder: the recorder did not begin: it did not begin within 0.3 s")
+            state = await scene.tester.ask(scene.offer.address, AskState(), ComponentState, within_s=WITHIN_S)
+            assert [absence.name for absence in state.absent] == ["recorder"]
+            begins.touch()
+            await asyncio.wait_for(goes_on.wait(), WITHIN_S)
+            assert recorder.absence() is None
+    finally:
+        await recorder.end()
+
+
+async def test_a_machine_whose_recording_cannot_be_written_is_not_offered(tmp_path: Path) -> None:
+    with pytest.raises(RecorderFailed, match="cannot be written"):
+        await offer_this_machine("night", "unixsock-stream/nowhere", None, "far", (), tmp_path / "no" / "far.mcap")
 
 
 async def test_the_launcher_ends_it_and_its_token_falls_when_nothing_runs_here(on_a_cable: Callable[..., Any]) -> None:
