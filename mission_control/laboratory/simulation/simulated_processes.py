@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
-from collections.abc import Callable, Coroutine, Generator
+from collections.abc import Callable, Coroutine
 from contextvars import Context, ContextVar
-from typing import TypeVar, TypeVarTuple
+from typing import Any, TypeVar, TypeVarTuple
 
 from backbone.bus.clock import VirtualLoop
 from backbone.component.heartbeat import BEAT_EVERY_S, Vitals
@@ -185,15 +185,11 @@ class ProcessLoop(VirtualLoop):
         step.timer = super().call_at(when, self._due, process, step, context=_NO_PROCESS)
         return step.timer
 
-    def create_task(
-        self,
-        coro: Coroutine[object, None, R] | Generator[object, None, R],
-        *,
-        name: object = None,
-        context: Context | None = None,
-    ) -> asyncio.Task[R]:
+    def create_task(  # Any: the types of coroutines differ between versions of Python
+        self, coro: Any, *, name: object = None, context: Context | None = None, **options: bool | None
+    ) -> asyncio.Task[Any]:
         """Begin a task of the present process; see ``asyncio.AbstractEventLoop.create_task``."""
-        task: asyncio.Task[R] = super().create_task(coro, name=None if name is None else str(name), context=context)
+        task = super().create_task(coro, name=None if name is None else str(name), context=context, **options)
         process = current_process.get() if context is None else context.get(current_process)
         if process is not None:
             process.tasks[task] = None
