@@ -134,8 +134,8 @@ class Recording:
             raise NoRecording(f"no whole recording: {error}") from error
         if profile != PROFILE:
             raise NotOfMessages(f"the file is of profile {profile!r}, a recording of {PROFILE!r}")
-        if summary is None or summary.statistics is None:
-            raise NoRecording("the recording has no index")
+        if summary is None or not names_all(summary):
+            raise NoRecording("the recording has no complete index")
         self._summary: Summary = summary
         self._name = getattr(file, "name", "the recording")
 
@@ -333,6 +333,22 @@ def check_index(file: IO[bytes]) -> None:
     if zlib.crc32(file.read(end - begin) + footer[: _END.size - 12]) != checksum:
         raise ValueError("its index is damaged")
     file.seek(0)
+
+
+def names_all(index: Summary) -> bool:
+    """Return whether the index leads to all messages and facts of its file; other writers may leave parts of it out.
+
+    Without it, the library reads messages unchecked and only forwards, and finds no facts.
+    """
+    numbers = index.statistics
+    return numbers is not None and (
+        (numbers.chunk_count > 0 or not numbers.message_count)
+        and numbers.chunk_count == len(index.chunk_indexes)
+        and numbers.metadata_count == len(index.metadata_indexes)
+        and numbers.attachment_count == len(index.attachment_indexes)
+        and numbers.schema_count == len(index.schemas)
+        and numbers.channel_count == len(index.channels)
+    )
 
 
 def _named(channel: Channel) -> tuple[str, str, str]:

@@ -31,6 +31,7 @@ from backbone.recording.reader import (
     NoRecording,
     NotOfMessages,
     check_index,
+    names_all,
     open_file,
 )
 from backbone.recording.writer import PROFILE, begun_writer
@@ -233,10 +234,11 @@ def _took_chunk(whole: _WholeRecording, chunk: Chunk) -> bool:
 
 
 def _index(file: IO[bytes]) -> Summary | None:
-    """Return the index; None: it is damaged or not there."""
+    """Return the index; None: it is damaged, incomplete or not there."""
     try:
         check_index(file)
-        return SeekingReader(file, record_size_limit=MOST_RECORD_BYTES).get_summary()
+        found = SeekingReader(file, record_size_limit=MOST_RECORD_BYTES).get_summary()
+        return found if found is not None and names_all(found) else None
     except (*DAMAGED, OSError):
         return None
     finally:
