@@ -24,7 +24,7 @@ async def join_to(paths: Sequence[Path], to: Path) -> ExitCode:
         OtherMission: The recordings are of different missions or starts.
     """
     with ExitStack() as stack:
-        recordings = {str(path): stack.enter_context(opened(path)) for path in paths}
+        recordings = [stack.enter_context(opened(path)) for path in paths]
         file = stack.enter_context(new_file(to))
         joined = join(recordings, file)
     copies = f"; {joined.left_out} that several recorders heard stand once" if joined.left_out else ""

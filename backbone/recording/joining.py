@@ -13,24 +13,24 @@ from __future__ import annotations
 import heapq
 import itertools
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from operator import itemgetter
-from typing import IO, TypeVar
+from typing import IO
 
 from mcap.records import Channel, Message, Schema
 
 from backbone.errors import Refusal
 from backbone.recording.clock_offsets import ClockObserver, ClockOffsets
-from backbone.recording.reader import NoRecording, Recorded, Recording
+from backbone.recording.reader import NotOfMessages, Recorded, Recording
 from backbone.recording.writer import MOST_CHANNELS, NS, begun_writer
 
 SAME_BEGIN_S = 2.0  # chosen: no mission ends and begins again so soon; only for recordings without the fact ``start``
 
 Placed = tuple[int, Schema | None, Channel, Message, Recorded]
 """Corrected ``log_time`` of a message, and its records."""
-Read = TypeVar("Read")
 
 
 class OtherMission(Refusal):
@@ -62,22 +62,19 @@ class Joined:
     clocks: ClockOffsets
 
 
-def join(recordings: Mapping[str, Recording], to: IO[bytes]) -> Joined:
+def join(recordings: Sequence[Recording], to: IO[bytes]) -> Joined:
     """Write all messages of these recordings (at least one recording) to a new one.
-
-    Args:
-        recordings: The recordings by name; refusals contain the name.
 
     Raises:
         OtherMission: The recordings are not of one start of one mission.
         NoRecording: A recording is damaged; the new file is not a recording.
         TooManyKeys: One file cannot hold all keys.
     """
-    facts = _common_facts([recording.contents().about for recording in recordings.values()])
+    facts = _common_facts([recording.contents().about for recording in recordings])
     clocks = _clocks(recordings)
     if clocks.wrong:
         facts["clock_offsets_s"] = json.dumps({host: offset.taken_s for host, offset in clocks.wrong.items()})
-    writer = _JoinedWriter(to, facts, next(filter(None, (one.mission_xml() for one in recordings.values())), ""))
+    writer = _JoinedWriter(to, facts, next(filter(None, (one.mission_xml() for one in recordings)), ""))
     heard = 0
     for placed in _each_once(heapq.merge(*_by_clock(recordings, clocks), key=itemgetter(0))):
         heard += 1
@@ -87,20 +84,11 @@ def join(recordings: Mapping[str, Recording], to: IO[bytes]) -> Joined:
     return Joined(writer.written, heard - writer.written, clocks)
 
 
-def _clocks(recordings: Mapping[str, Recording]) -> ClockOffsets:
+def _clocks(recordings: Sequence[Recording]) -> ClockOffsets:
     observer = ClockObserver()
-    read = (_named(name, recording.messages()) for name, recording in recordings.items())
-    for message in heapq.merge(*read, key=lambda one: one.at_s):
+    for message in heapq.merge(*(one.messages() for one in recordings), key=lambda one: one.at_s):
         observer.take(message)
     return observer.offsets()
-
-
-def _named(name: str, messages: Iterable[Read]) -> Iterator[Read]:
-    """Yield the messages. A refusal names the recording."""
-    try:
-        yield from messages
-    except NoRecording as error:
-        raise NoRecording(f"{name}: {error.detail}") from error
 
 
 def _common_facts(facts: Sequence[dict[str, str]]) -> dict[str, str]:
@@ -108,11 +96,12 @@ def _common_facts(facts: Sequence[dict[str, str]]) -> dict[str, str]:
 
     Raises:
         OtherMission: The recordings are not of one start of one mission.
+        NotOfMessages: The begin of one is no time of day.
     """
     missions = sorted({one.get("mission", "") for one in facts})
     if len(missions) > 1:
         raise OtherMission(f"the recordings are of the missions {', '.join(map(repr, missions))}")
-    begins = sorted(datetime.fromisoformat(one["begun"]) for one in facts if "begun" in one)
+    begins = sorted(_time_of_day(one["begun"]) for one in facts if "begun" in one)
     is_apart = bool(begins) and (begins[-1] - begins[0]).total_seconds() > SAME_BEGIN_S
     starts = {one.get("start", "") for one in facts}
     if len(starts - {""}) > 1 or (is_apart and "" in starts):
@@ -125,11 +114,19 @@ def _common_facts(facts: Sequence[dict[str, str]]) -> dict[str, str]:
     return common
 
 
-def _by_clock(recordings: Mapping[str, Recording], clocks: ClockOffsets) -> Iterator[Iterator[Placed]]:
+def _time_of_day(text: str) -> datetime:
+    with suppress(ValueError):
+        found = datetime.fromisoformat(text)
+        if found.tzinfo is not None:
+            return found
+    raise NotOfMessages(f"a recording has begun at {text!r}, which is no time of day with a time zone")
+
+
+def _by_clock(recordings: Sequence[Recording], clocks: ClockOffsets) -> Iterator[Iterator[Placed]]:
     """Yield, for each recording and each different offset, the messages of that offset in corrected order."""
     offsets = {offset.taken_s for offset in clocks.offsets.values()} | {0.0}
-    for (name, recording), offset_s in itertools.product(recordings.items(), sorted(offsets)):
-        yield _named(name, _of_clock(recording, clocks, offset_s))
+    for recording, offset_s in itertools.product(recordings, sorted(offsets)):
+        yield _of_clock(recording, clocks, offset_s)
 
 
 def _of_clock(recording: Recording, clocks: ClockOffsets, offset_s: float) -> Iterator[Placed]:

@@ -226,6 +226,8 @@ class Recording:
 def _refusing_damage(name: object) -> Iterator[None]:
     try:
         yield
+    except NotOfMessages as error:
+        raise NotOfMessages(f"{name}: {error.detail}") from error
     except DAMAGED as error:
         raise NoRecording(f"{name} is damaged: {error}") from error
 
@@ -390,7 +392,8 @@ def _recorded(channel: Channel, message: Message) -> Recorded:
         found = Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)
     except TypeError as error:
         raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: {error}") from error
-    numbers = found.stamp_s, found.heard_s, found.sequence
-    if not (all(isinstance(one, int | float) for one in numbers) and isinstance(found.cause, str)):
-        raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: it has no numbers")
+    numbers, texts = (found.stamp_s, found.heard_s, found.sequence), (found.key, found.source, found.cause)
+    if not (all(isinstance(one, int | float) for one in numbers) and all(isinstance(one, str) for one in texts)):
+        why = "it has no numbers or no texts where a message has them"
+        raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: {why}")
     return found

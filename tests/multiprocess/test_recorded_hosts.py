@@ -118,8 +118,8 @@ def test_the_clock_of_a_host_two_seconds_off_is_told_and_order_by_cause_is_right
         right = {host: Recording(stack.enter_context(path.open("rb"))) for host, path in night.files.items()}
         wrong = {host: Recording(with_clock_off(recording, off, OFF_S)) for host, recording in right.items()}
         assert before_their_causes(wrong["base"].messages()) != []
-        usual = join(right, io.BytesIO())
-        clocks = join(wrong, made := io.BytesIO()).clocks
+        usual = join([*right.values()], io.BytesIO())
+        clocks = join([*wrong.values()], made := io.BytesIO()).clocks
     assert clocks.reference == "base"
     # On a busy machine the answer with the mission's time is late, so the clock of far was not quite right before.
     found, was = clocks.wrong["far"], usual.clocks.offsets["far"]
@@ -163,7 +163,7 @@ def test_what_a_host_says_while_its_link_is_cut_is_recorded_and_afterwards_it_go
     assert during
     with contextlib.ExitStack() as stack:
         paths = [*left.files.values(), further]
-        opened = {str(path): Recording(stack.enter_context(path.open("rb"))) for path in paths}
+        opened = [Recording(stack.enter_context(path.open("rb"))) for path in paths]
         join(opened, made := io.BytesIO())
     found = [*Recording(made).messages()]
     assert during <= {one.id for one in found if seen_s < one.at_s < again_s}

@@ -17,7 +17,7 @@ from backbone.keys import Conversation
 from backbone.keys import key as key_of
 from backbone.recording.joining import Joined, OtherMission, join
 from backbone.recording.presence import Presence
-from backbone.recording.reader import NoRecording, Recorded, Recording, missing_numbers
+from backbone.recording.reader import NoRecording, NotOfMessages, Recorded, Recording, missing_numbers
 from backbone.recording.writer import NS, RecordingWriter
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
@@ -53,7 +53,7 @@ def file_of(messages: Iterable[Said], about: dict[str, str] | None = None, late_
 
 def joined(*files: io.BytesIO) -> tuple[Joined, Recording]:
     made = io.BytesIO()
-    done = join({f"{n}.mcap": Recording(file) for n, file in enumerate(files)}, made)
+    done = join([*map(Recording, files)], made)
     return done, Recording(made)
 
 
@@ -150,9 +150,16 @@ def test_a_damaged_recording_is_refused() -> None:
     whole = file_of([said(SCOUT, n, float(n)) for n in range(1, 50)]).getvalue()
     at = whole.index(b"scout-backbone") + 400
     damaged = io.BytesIO(whole[:at] + bytes([whole[at] ^ 255]) + whole[at + 1 :])
-    with pytest.raises(NoRecording, match=r"1\.mcap: ") as refused:
+    damaged.name = "1.mcap"
+    with pytest.raises(NoRecording, match=r"^1\.mcap is damaged: ") as refused:
         joined(file_of([]), damaged)
     assert "record recover" in refused.value.remedy
+
+
+@pytest.mark.parametrize("begun", ["yesterday", "2026-05-04T11:00:00", ""])
+def test_a_begin_that_is_no_time_of_day_is_refused(begun: str) -> None:
+    with pytest.raises(NotOfMessages, match=repr(begun)):
+        joined(file_of([]), file_of([], ABOUT | {"begun": begun}))
 
 
 def two_hosts(far_s: float, count: int = 20) -> tuple[list[Said], list[Said]]:
@@ -202,7 +209,7 @@ def test_messages_of_a_host_with_a_wrong_clock_are_put_in_the_order_of_causes(fa
     for one in found:
         assert one.stamp_s - one.at_s == pytest.approx(far_s if one.source == SCOUT else 0.0, abs=0.002)
     again = io.BytesIO()
-    assert join({"joined.mcap": recording}, again).clocks.wrong == {}, "what is corrected is not corrected again"
+    assert join([recording], again).clocks.wrong == {}, "what is corrected is not corrected again"
     assert [*Recording(again).messages()] == found
 
 

@@ -293,12 +293,16 @@ def test_copies_inside_copies_are_not_followed() -> None:
 
 
 UNNUMBERED = b'{"stamp_s":"soon","heard_s":1.0,"sequence":1,"cause":"","body":{}}'
+NO_KEY = UNNUMBERED.replace(b'"soon"', b'1.0,"key":5')
+NO_SOURCE = UNNUMBERED.replace(b'"soon"', b'1.0,"source":null')
 
 
-@pytest.mark.parametrize("data", [b"{}", b"7", b'{"x": 1}', b"[]", UNNUMBERED])
+@pytest.mark.parametrize("data", [b"{}", b"7", b'{"x": 1}', b"[]", UNNUMBERED, NO_KEY, NO_SOURCE])
 def test_messages_of_another_form_are_refused(data: bytes) -> None:
-    with pytest.raises(NotOfMessages):
-        read(foreign(PROFILE, data).getvalue())
+    file = foreign(PROFILE, data)
+    file.name = "other.mcap"
+    with pytest.raises(NotOfMessages, match=r"^other\.mcap: the message at 0.000 s in /t is none of a bus: "):
+        [*Recording(file).messages()]
 
 
 @pytest.mark.parametrize("profile", ["", "ros1", "ros2", "px4"])
