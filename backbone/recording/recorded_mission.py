@@ -36,6 +36,9 @@ HISTORY = frozenset(
 )
 """Conversations of which all earlier messages determine the answers."""
 _TABLES = ("present", "there", "_states", "_guests", "_newest", "_open", "_answers")
+_FOLLOWED = frozenset(
+    kind.__name__ for kind in (Presence, ComponentState, StoryEvent, OperatorActed, Decided, ScheduleSnapshot)
+)
 MOST_OPEN = 1000  # chosen: questions under way at one time; older ones were never answered
 
 
@@ -80,8 +83,9 @@ class RecordedMission:
         self._schedule = RecordedSchedule()
 
     def take(self, message: Recorded) -> None:
-        """Apply the message."""
-        self.take_said(message, message_as_sent(self._classes, message))
+        """Apply the message; restoring one as it was sent takes most of the time, so only some are restored."""
+        is_read = message.schema.partition("/")[0] in _FOLLOWED or self._is_of_a_read(message)
+        self.take_said(message, message_as_sent(self._classes, message) if is_read else None)
 
     def take_said(self, message: Recorded, said: Message | None) -> None:
         """Apply the message.
@@ -105,7 +109,7 @@ class RecordedMission:
                 self._log.add(said.event(message.source, message.cause))
             case Decided() | ScheduleSnapshot() if message.source == RC_MANAGER:
                 self._schedule.take(said, message)
-        if conversation == Conversation.ASK and said is not None:
+        if said is not None and self._is_of_a_read(message):
             self._asked_or_answered(address, message, said)
 
     def copied(self) -> RecordedMission:
@@ -173,6 +177,11 @@ class RecordedMission:
             self.present.pop(address, None)
             self._states.pop(address, None)
             self.there.pop(address, None)
+
+    def _is_of_a_read(self, message: Recorded) -> bool:
+        """Return whether it is a question that changes nothing, or may answer one; no answer to a command is used."""
+        is_asked = message.key.endswith(f"/{Conversation.ASK}")
+        return is_asked and (message.schema.startswith(READS) or message.cause in self._open)
 
     def _asked_or_answered(self, address: str, message: Recorded, said: Message) -> None:
         asked = self._open.get(message.cause)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from typing import Any
+
 from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,18 +18,20 @@ from backbone.component.messages import (
     LifeState,
     LogLevel,
     Parameters,
+    SetParameter,
     StoryEvent,
 )
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.mission_log.log import AskLog, Log
 from backbone.nameserver.messages import ListComponents
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.recording.checkpoints import EACH_S, Checkpoints
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
 from backbone.recording.recorded_mission import RecordedMission
 from backbone.recording.writer import NS
-from backbone.wire import Message
+from backbone.wire import Message, schema_of
 from resource_pool.messages import Frame
 
 LAST_S = 5 * EACH_S
@@ -80,6 +85,37 @@ def test_from_a_checkpoint_or_from_the_begin_a_mission_is_the_same(said: list[tu
                 whole.take(message)
         for fresh in (checkpoints, Checkpoints(CLASSES), Checkpoints(CLASSES, most=0)):
             assert told(fresh.mission_at(recording, at_s)) == told(whole)
+
+
+class CountingClasses(dict[str, type[Message]]):
+    """Message classes that count by schema how many messages were restored."""
+
+    def __init__(self) -> None:
+        super().__init__(CLASSES)
+        self.restored = Counter[str]()
+
+    def get(self, schema: str, default: Any = None) -> Any:
+        self.restored[schema] += 1
+        return super().get(schema, default)
+
+
+def test_states_and_commands_which_answer_no_question_are_not_restored() -> None:
+    asker = "ui_console/anna"
+    said = [
+        one
+        for at_s in range(20)
+        for one in (
+            Said(at_s, LAUNCHER, Conversation.HEALTH, MissionHealth(HealthWord.OK), LAUNCHER),
+            Said(at_s, SCOUT, Conversation.ASK, SetParameter("speed", at_s), asker),
+            Said(at_s, SCOUT, Conversation.ASK, Parameters({"speed": at_s}), SCOUT, f"{asker}#{at_s + 1}"),
+        )
+    ]
+    said += messages(20.0, "asked", 7)
+    classes = CountingClasses()
+    mission = Checkpoints(classes).mission_at(Recording(recorded(said)), 30.0)
+    assert mission.answer(SCOUT, AskParameters()) == Parameters({"speed": 7})
+    assert [one.schema for one in mission.newest()] == [schema_of(MissionHealth)]
+    assert classes.restored == {schema_of(AskParameters): 1, schema_of(Parameters): 1}
 
 
 @given(times=st.lists(st.integers(0, 10**12), min_size=1, max_size=8), data=st.data())

@@ -1,4 +1,4 @@
-"""A recording that another MCAP writer wrote is read whole, or refused until it is recovered; nothing is lost unsaid."""
+"""A recording of another MCAP writer is read whole, or refused until it is recovered; nothing is lost unsaid."""
 
 from __future__ import annotations
 
