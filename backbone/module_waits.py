@@ -6,7 +6,7 @@ from typing import Annotated
 
 import msgspec
 
-from backbone.ranges import FEW, Count, Mention
+from backbone.ranges import FEW, Count, Instant, Mention
 from backbone.wire import Message
 
 
@@ -39,8 +39,10 @@ class ModuleWaits(Message, frozen=True):
         runs: Number of its runs.
         awaited: Inputs that it waits for at present; empty: it runs in the unit's next round.
         needs_all: True: it needs all of them; False: one of them is enough.
+        computes_since_s: Mission time of the round in which its ``update`` runs at present; None: it does not run.
     """
 
     runs: Count
     awaited: Annotated[list[AwaitedInput], FEW]
     needs_all: bool
+    computes_since_s: Instant | None = None

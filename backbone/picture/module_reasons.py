@@ -14,13 +14,15 @@ from backbone.spoken import counted
 
 
 def module_lines(name: str, unit: ComponentState, waits: ModuleWaits, there: Collection[str]) -> list[str]:
-    """Return what the module does, and a line for each input that it waits for.
+    """Return what the module does, and, if it does not compute, a line for each input that it waits for.
 
     Args:
         there: Addresses of the mission's components.
     """
     runs = "has not run yet" if not waits.runs else f"has run {counted(waits.runs, 'time')}"
     first = f"{name} is a module of {component_of(unit.address)}, which is {unit.state} on {unit.host}; it {runs}"
+    if waits.computes_since_s is not None:
+        return [first, f"  it computes since {waits.computes_since_s:.3f} s"]
     if not waits.awaited:
         return [first, "  it has its inputs, and runs in the next round"]
     one_of = "" if waits.needs_all or len(waits.awaited) == 1 else "one of these is enough: "

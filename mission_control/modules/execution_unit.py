@@ -154,6 +154,13 @@ class AwaitedKeys(NamedTuple):
     needs_all: bool
 
 
+class Computing(NamedTuple):
+    """A module whose ``update`` runs, in the round of this time."""
+
+    module: str
+    round_s: float
+
+
 @dataclass(frozen=True, slots=True)
 class WantedExchange:
     """A request to replace a module by another one.
@@ -192,6 +199,9 @@ class ExecutionUnit:
         start_s: Time of its first tick.
         stopwatch: Measures how long each module runs.
 
+    Attributes:
+        computing: The module whose ``update`` runs, and the time of its round, a new object for each run; None: none.
+
     Raises:
         NeverRuns: The unit has neither a frequency nor an input that begins a round.
     """
@@ -215,6 +225,7 @@ class ExecutionUnit:
         self._fresh = self._fresh_inputs()
         self._exchanging: _Exchanging | None = None
         self._wanted: WantedExchange | None = None
+        self.computing: Computing | None = None
         self._begin(start_s)
 
     def _fresh_inputs(self) -> dict[str, list[_Input]]:
@@ -285,14 +296,14 @@ class ExecutionUnit:
         """Return the outputs of this seat in this round; None: inputs are missing."""
         pair = self._exchanging
         if pair is None or pair.old is not seat:
-            return self._turn(seat)
-        return pair.exchange.round(now_s, partial(self._turn, seat), partial(self._turn, pair.new))
+            return self._turn(seat, now_s)
+        return pair.exchange.round(now_s, partial(self._turn, seat, now_s), partial(self._turn, pair.new, now_s))
 
-    def _turn(self, seat: _Seat) -> Mapping[str, object] | None:
+    def _turn(self, seat: _Seat, now_s: float) -> Mapping[str, object] | None:
         given = seat.taken()
         if given is None:
             return None
-        began_s = self._stopwatch()
+        began_s, self.computing = self._stopwatch(), Computing(seat.name, now_s)
         try:
             outputs = seat.module.update(seat.module.Inputs(**given))
         except UNPROVED as error:
@@ -301,6 +312,8 @@ class ExecutionUnit:
             raise
         except BaseException as error:  # CancelledError: a task ends by it without a bug, and the unit would be still
             raise _as_bug(seat.name, error) from error
+        finally:
+            self.computing = None
         seat.times = seat.times.with_run(self._stopwatch() - began_s)
         return seat.values(outputs)
 

@@ -52,6 +52,7 @@ if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
     from numpy.typing import NDArray
 
 _TABLES = ("overwritten", "modules")  # suffixes in the statistics, so that each entry has its own name
+LONG_UPDATE_S = 5.0  # chosen: longer than a slow planner computes; seconds of the machine
 REPORT_EVERY_S = 1.0  # chosen: a person reads no faster; seconds of the mission
 
 
@@ -93,7 +94,7 @@ class UnitComponent(Component[UnitParameters]):
         fresh, exchanged = self._fresh_views, self._exchanged
         self._exchanges = UnitExchanges(self, self._modules, self._graph, lambda: self._unit, fresh, exchanged)
         self._missed, self._report_again_s = 0, -math.inf
-        self._misses_text = ""
+        self._misses_text = self._long_text = ""
         self._deadlines = self._new_deadlines()
 
     def _new_unit(self) -> ExecutionUnit:
@@ -126,12 +127,23 @@ class UnitComponent(Component[UnitParameters]):
         """Run the rounds of the frequency; arriving inputs begin their own rounds."""
         self.start_task(self._deadlines.watch(), "deadlines")
         if self._thread is not None:
+            if self._place is not None:
+                self.start_task(self._watch_long_updates(), "long updates")
             await self._thread.keep()
         while self._unit.due_s < math.inf:
             await self.clock.sleep_until_s(self._unit.due_s)
             now_s = self.clock.now_s()
             if self._unit.tick(now_s):
                 self._run(now_s)
+
+    async def _watch_long_updates(self) -> None:
+        """Report the module whose ``update`` has run for ``LONG_UPDATE_S`` or longer, until it ends."""
+        while True:
+            before = self._unit.computing
+            await self.clock.sleep_s(LONG_UPDATE_S * self.clock.rate)
+            is_long = before is not None and before is self._unit.computing
+            self._long_text = f"{before.module} computes since {before.round_s:.3f} s" if before and is_long else ""
+            self._tell()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer questions for debug views and modules, and exchange a module."""
@@ -155,7 +167,9 @@ class UnitComponent(Component[UnitParameters]):
         sources = {key: source.address for key, source in self.parameters.sources.items()} | makers
         late, keys = self._deadlines.late, waits.keys.items()
         awaited = [AwaitedInput(key, sources[key], has_come, key in late) for key, has_come in keys]
-        return ModuleWaits(waits.runs, awaited, waits.needs_all)
+        now = self._unit.computing
+        since_s = now.round_s if now is not None and now.module == module else None
+        return ModuleWaits(waits.runs, awaited, waits.needs_all, since_s)
 
     def parameters_changed(self) -> None:
         """Choose sources; no other parameter can change at run time.
@@ -244,8 +258,9 @@ class UnitComponent(Component[UnitParameters]):
             self._tell()
 
     def _tell(self) -> None:
-        """Report late inputs, missed rounds, and the place of the thread."""
-        self.report("; ".join(filter(None, [self._deadlines.text, self._misses_text, self._thread_text()])))
+        """Report late inputs, a long update, missed rounds, and the place of the thread."""
+        texts = self._deadlines.text, self._long_text, self._misses_text, self._thread_text()
+        self.report("; ".join(filter(None, texts)))
 
     def _thread_text(self) -> str:
         given = self.parameters

@@ -39,6 +39,7 @@ IS_MODULE = "tracking is a module of vision, which is ready on base; it "
 @pytest.mark.parametrize(
     ("waits", "lines"),
     [
+        (ModuleWaits(3, [BALL], True, 4.5), ["has run 3 times", "it computes since 4.500 s"]),
         (ModuleWaits(3, [], needs_all=False), ["has run 3 times", "it has its inputs, and runs in the next round"]),
         (
             ModuleWaits(0, [PICTURE, BALL], needs_all=True),
