@@ -162,7 +162,11 @@ class LargeGroupPlanner:
         return estimate(self._table, [*self.before(arc), arc], now_s)[-1:]
 
     def start_s(self, arc: ArcEntry, now_s: float) -> float:
-        """Return an estimate of when the RCs of a queued ARC will begin to settle."""
+        """Return an estimate of when the RCs of a queued ARC will begin to settle; infinite behind a higher one."""
+        others = [one for rc in arc.uses for one in self._state.users[rc] if one.queued and one.level is not arc.level]
+        alone = [one for one in others if arc.touches & one.excludes or arc.excludes & one.touches]
+        if any(one.goes_before(arc) and self._table.usable(one) for one in alone):
+            return math.inf  # as ``estimate`` finds, too, but only after it has put all in order
         return self.slots_around(arc, now_s)[0].start_s
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:

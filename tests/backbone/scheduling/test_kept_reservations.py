@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from random import Random
 from typing import Any
@@ -95,6 +96,25 @@ def test_answers_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(5):
         fleet(seed, {})
     assert answers.count(True) > 100
+
+
+@pytest.mark.parametrize("seed", [2, 5, 6, 7])  # in these some ARC is revoked while a higher one waits
+def test_the_start_behind_a_higher_arc_is_that_of_the_whole_estimate(seed: int) -> None:
+    def starts(start_s: Callable[[LargeGroupPlanner, ArcEntry, float], float]) -> list[float]:
+        found: list[float] = []
+
+        def recorded(planner: LargeGroupPlanner, arc: ArcEntry, now_s: float) -> float:
+            found.append(start_s(planner, arc, now_s))
+            return found[-1]
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(LargeGroupPlanner, "start_s", recorded)
+            crowd(seed, {})
+        return found
+
+    expected = starts(lambda planner, arc, now_s: planner.slots_around(arc, now_s)[0].start_s)
+    assert starts(LargeGroupPlanner.start_s) == expected
+    assert math.inf in expected
 
 
 def test_a_request_that_is_first_in_no_line_examines_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
