@@ -77,15 +77,21 @@ class _Reserved:
     looked: int
 
 
+_Found = tuple[ArcEntry, _Reserved]
+"""An ARC and its reservation."""
+
+
 class _Delayed(NamedTuple):
-    """Why an ARC cannot start yet.
+    """Why an ARC could not start when this was last asked.
 
     Attributes:
-        version: Sum of the versions of its RCs, and of their service, at that time.
-        reserved: The reservation that a start would delay.
+        version: Sum of the versions of its RCs, and of their service, at that time; -1: the answer is not kept.
+        other: The ARC whose reservation a start would delay, the first to ask about again.
+        reserved: That reservation.
     """
 
     version: int
+    other: ArcEntry
     reserved: _Reserved
 
 
@@ -151,9 +157,11 @@ class FirstInLine:
         at = {rc: self.at(rc) for rc in arc.uses}
         chain = _Chain((arc,), self._ahead(arc, at))
         found = self._delayed_by(chain, at, holders, now_s)
-        if found is not None and not found.rcs & chain.ahead:
-            self._delayed[arc] = _Delayed(self._version_at(arc), found)
-        return found is not None
+        if found is None:
+            return False
+        other, reserved = found
+        self._delayed[arc] = _Delayed(-1 if reserved.rcs & chain.ahead else self._version_at(arc), other, reserved)
+        return True
 
     def _look(self, now_s: float) -> None:
         """Take note of the time and of all changes since the last look; reservations that they concern are outdated."""
@@ -197,10 +205,17 @@ class FirstInLine:
 
     def _delayed_by(
         self, chain: _Chain, at: Mapping[str, ArcEntry | None], holders: Sequence[ArcEntry], now_s: float
-    ) -> _Reserved | None:
+    ) -> _Found | None:
         """Return the first reservation found that a start of the candidate now would delay; None if there is none."""
         (arc,) = chain.arcs
         firsts = dict.fromkeys(first for first in at.values() if first is not None)
+        if arc in self._delayed:
+            last = self._delayed[arc].other
+            is_higher = last.queued and last.touches & arc.touches and last.goes_before(arc)
+            if is_higher or (last in firsts and arc not in firsts):  # then it counts, and mostly it is it again
+                delayed = self._first_delayed([last], chain, holders, now_s)
+                if delayed is not None:
+                    return delayed
         if arc not in firsts:
             delayed = self._first_delayed(firsts, chain, holders, now_s)
             if delayed is not None:
@@ -222,7 +237,7 @@ class FirstInLine:
 
     def _first_delayed(
         self, others: Iterable[ArcEntry], chain: _Chain, holders: Sequence[ArcEntry], now_s: float
-    ) -> _Reserved | None:
+    ) -> _Found | None:
         """Return the first of the others' reservations that the candidate, beside holders with room for it, delays."""
         (arc,) = chain.arcs
         fits, end_s, shared = self._table.fits, self._must_be_done_s(arc, now_s), arc.touches & ~arc.excludes
@@ -232,7 +247,7 @@ class FirstInLine:
             if other is not arc and not fits(arc, beside) and self._table.usable(other):
                 reserved = self._reserved_at((other, LOOK_AHEAD), chain, now_s)
                 if reserved.start_s < end_s:
-                    return reserved
+                    return other, reserved
         return None
 
     def _is_being_freed_for(self, other: ArcEntry, arc: ArcEntry) -> bool:
