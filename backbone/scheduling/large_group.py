@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
-from backbone.scheduling.estimate import estimate
+from backbone.scheduling.estimate import estimate, starts_s
 from backbone.scheduling.first_in_line import FirstInLine
 from backbone.scheduling.planner import Slot, Turn
 from backbone.scheduling.preemption import in_the_way, must_let_higher_go_first
@@ -167,7 +167,7 @@ class LargeGroupPlanner:
         alone = [one for one in others if arc.touches & one.excludes or arc.excludes & one.touches]
         if any(one.goes_before(arc) and self._table.usable(one) for one in alone):
             return math.inf  # as ``estimate`` finds, too, but only after it has put all in order
-        return self.slots_around(arc, now_s)[0].start_s
+        return starts_s(self._table, [*self.before(arc), arc], now_s)[-1]
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the queued ARCs that come before a queued one at one of its RCs, in order.
