@@ -46,7 +46,9 @@ class CommandingBehavior(Behavior[BehaviorParameters]):
                 await self.clock.sleep_s(PAUSE_S)
 
     def statistics(self) -> dict[str, float]:
-        """Return percentiles in seconds."""
+        """Return how many commands were answered, and the percentiles in seconds once one was."""
+        if not self.bare_s:
+            return {"commands": 0.0}
         shares = {"p50_s": 0.5, "p99_s": 0.99}
         return {
             "commands": float(len(self.commands_s)),
