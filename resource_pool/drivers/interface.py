@@ -32,7 +32,7 @@ OPENS_WITHIN_S = 60.0  # chosen: three times as long as a world may take to answ
 
 
 class UnknownDriver(Refusal):
-    """No driver of this name exists for this kind of resource."""
+    """No driver of this name exists for this kind of resource; facts: ``class_path``, if it cannot be imported."""
 
     code = "driver.unknown"
     remedy = "Name a built-in driver, or a class as package.module:Class."
@@ -274,7 +274,7 @@ def driver_class(path: str, resource: str, protocol: type = object) -> Callable[
         found: Callable[[DriverSite], Any] = getattr(importlib.import_module(module_name), class_name)
     except (ImportError, AttributeError) as error:
         told, remedy = import_fault(path, error)
-        raise UnknownDriver(f"{resource}: {told}", remedy=remedy) from error
+        raise UnknownDriver(f"{resource}: {told}", remedy=remedy, class_path=path) from error
     if not callable(found):
         raise UnknownDriver(f"{resource}: {path} is no class")
     is_judged = isinstance(found, type) and not hasattr(found, "__getattr__")  # which may pass calls on to another

@@ -39,6 +39,7 @@ def test_a_file_that_cannot_be_imported_is_named_with_its_line(
         load(f"{module}:Own")
     assert f"({files / f'{module}.py'}, line {line})" in refused.value.detail
     assert "file" in refused.value.remedy
+    assert refused.value.facts["class_path"] == f"{module}:Own"
 
 
 @pytest.mark.parametrize(("load", "kind"), LOADERS)
