@@ -72,13 +72,13 @@ async def test_one_whose_first_begin_is_broken_off(tmp_path: Path, monkeypatch: 
     beginning = asyncio.create_task(recorder.begin())
     await until_it_hangs(tmp_path)
     absent = recorder.absence()
-    assert absent is not None, "the start waits for it"
-    assert absent.cause == "it does not listen yet"
     await end_tasks(beginning)
     try:
         await recorder.end()
     finally:
         assert left(tmp_path) == []
+    assert absent is not None, "the start waits for it"
+    assert absent.cause == "it does not listen yet"
 
 
 async def test_one_that_fell_and_whose_next_begin_is_broken_off(
