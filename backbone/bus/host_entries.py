@@ -67,5 +67,5 @@ class HostEntries:
                 self._file(address).unlink(missing_ok=True)
 
     def _file(self, address: str) -> Path:
-        """Return a file whose name has a fixed length, whatever the address."""
+        """Return the file of an address; a digest names it, because an address may be longer than a file name."""
         return self._folder / hashlib.blake2s(address.encode(), digest_size=12).hexdigest()

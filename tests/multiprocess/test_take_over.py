@@ -176,7 +176,7 @@ async def counted(bus: Bus, address: str) -> dict[str, float]:
 async def sees_more_than(bus: Bus, frames: float) -> None:
     """Return when the watcher, which has its robot, has seen more frames; a busy machine has few in a second."""
     async with asyncio.timeout(SEEN_WITHIN_S):
-        while (await counted(bus, WATCHER))["frames_seen"] <= frames:  # noqa: ASYNC110  no message tells of each
+        while (await counted(bus, WATCHER))["frames_seen"] <= frames:  # noqa: ASYNC110  no frame is announced
             await asyncio.sleep(0.05)
 
 

@@ -1,4 +1,4 @@
-"""What is under the finger of an operator stays there, whatever else the page comes to show."""
+"""The page keeps the pad and its buttons in place while other elements come and go."""
 
 from __future__ import annotations
 
