@@ -45,6 +45,7 @@ PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start takes less
 SAME_EVERY_S = 60.0  # chosen: a wait for a person at another machine may last hours
 REPLY_TIME_S = 2.0  # chosen: the RC manager answers in milliseconds
 SWITCH_S = 0.1  # chosen: the decisions of one switch become one line; a person sees no delay
+AT_ONCE = 10  # chosen: with more requests the line is longer and changes more often than a person can read
 ENDS_WITHIN_S = 1.0  # chosen: a terminal that reads takes the last lines at once
 REDRAW_EVERY_S = 0.5  # chosen: slices of seconds stay visible; a faster picture takes a core that the mission needs
 
@@ -178,17 +179,20 @@ class ConsoleObserver:
         """Print the holders whenever they have changed, until the mission is down.
 
         The begin of the last run cancels this. It does not subscribe to the published schedule, because the RC manager
-        would then compute the schedule twice a second.
+        would then compute the schedule twice a second. The more requests there are, the longer an answer takes, so the
+        more seldom it asks.
         """
-        decided = asyncio.Event()
+        decided, requests = asyncio.Event(), 0
         bus.subscribe(RC_MANAGER, Conversation.EVENTS, TraceLine, lambda _line: decided.set())
         try:
             while True:
                 decided.clear()
                 with contextlib.suppress(LinkError):  # of the next RC manager there are events, too
-                    self._tell_changed(await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S))
+                    schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
+                    requests = len(schedule.requests)
+                    self._tell_changed(schedule)
                 await decided.wait()
-                await clock.sleep_s(SWITCH_S * clock.rate)
+                await clock.sleep_s(SWITCH_S * max(1.0, requests / AT_ONCE) * clock.rate)
         finally:
             with contextlib.suppress(RuntimeError):  # the bus is closed already
                 bus.subscribe(

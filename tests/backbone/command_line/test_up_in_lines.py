@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import io
 
+import pytest
 from rich.console import Console
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.command_line.mission_console import ConsoleObserver
 from backbone.component.messages import Absence, ComponentState, LifeState, StoryEvent
 from backbone.keys import Conversation
 from backbone.picture.health import HealthWord, MissionHealth
+from backbone.rc_manager.messages import AskSchedule, TraceLine
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RequestView, Schedule
+from backbone.waiting import end_tasks
+from backbone.wire import Envelope, Message
 
 
 def test_consoles_that_came_and_went_are_not_kept_but_named_by_their_people() -> None:
@@ -73,3 +81,31 @@ def test_a_long_wait_is_told_less_and_less_often() -> None:
     told = [line for line in lines.getvalue().splitlines() if "farther" not in line]
     assert 8 <= len(told) <= 14
     assert "farther is absent for 300.0 s" in lines.getvalue()
+
+
+@pytest.mark.parametrize(("requests", "most"), [(3, 105), (100, 15)])
+def test_the_more_requests_there_are_the_more_seldom_their_holders_are_asked_for(requests: int, most: int) -> None:
+    asked: list[float] = []
+    waiting = [
+        RequestView(f"arc{number}", "", RequestState.WAITING, ["radio"], 0.0, -1.0, -1.0, "", [], 1.0, "", 0)
+        for number in range(requests)
+    ]
+
+    async def scene() -> None:
+        clock, network = VirtualClock(), LocalNetwork("lines")
+        manager, up = network.join(RC_MANAGER, clock), network.join("backbone/launcher", clock)
+
+        async def answer(_asked: Envelope[Message]) -> Message:
+            asked.append(clock.now_s())
+            return Schedule(clock.now_s(), [], waiting, [])
+
+        manager.serve(RC_MANAGER, AskSchedule, answer)
+        observer = ConsoleObserver(Console(file=io.StringIO()), live=False)
+        showing = asyncio.create_task(observer.up(up, clock))
+        for _ in range(200):
+            await clock.sleep_s(0.05)
+            manager.publish(RC_MANAGER, Conversation.EVENTS, TraceLine({"ev": "grant"}, ""))
+        await end_tasks(showing)
+
+    run_virtual(scene())
+    assert most / 2 <= len(asked) <= most
