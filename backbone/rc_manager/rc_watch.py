@@ -259,7 +259,7 @@ class RcWatch:
         clock = self._service.clock
         try:
             await clock.sleep_s(after_s * clock.rate)
-            while not await self.meet(rc) and rc in await self._recovery.present():
+            while not await self.meet(rc) and await self._recovery.is_present(rc):
                 await clock.sleep_s(MEET_AGAIN_S * clock.rate)
         finally:
             self._failing.discard(rc)

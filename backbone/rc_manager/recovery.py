@@ -17,7 +17,7 @@ from backbone.bus.interface import Bus, Clock, Reply
 from backbone.component.messages import ComponentState
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import Components, ListComponents
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.context_switch import RC_REPLY_S
 from backbone.rc_manager.messages import AskRc, AskRequest, CurrentRequest, RcState
@@ -144,6 +144,18 @@ class Recovery:
     async def present(self) -> set[str]:
         """Return the names of all components, once the nameserver's list is complete."""
         return {component_of(component.address) for component in await self._listing()}
+
+    async def is_present(self, name: str) -> bool:
+        """Return whether the nameserver knows a component of this name, once its list is complete."""
+        while True:
+            try:
+                await self.until_answered(NAMESERVER, Resolve(name), Resolved)
+            except UnknownName as unknown:
+                if unknown.facts.get("complete", True):
+                    return False
+            else:
+                return True
+            await self._clock.sleep_s(RETRY_S * self._clock.rate)
 
     async def ask_all(self, addresses: Sequence[str], question: Message, reply: type[Reply]) -> dict[str, Reply]:
         """Ask all addresses at once; return the answers, by name."""

@@ -6,7 +6,7 @@ answers late or not at all, or the processor is full, the remedy of the RC names
 
 from __future__ import annotations
 
-from contextlib import suppress
+import math
 from dataclasses import dataclass
 
 from backbone.addresses import NAMESERVER
@@ -18,6 +18,7 @@ from backbone.naming import Subsystem, address
 
 LONG_S = 0.1  # chosen: from this round trip on, the RCs of a host need a longer time to disconnect
 MEASURED_WITHIN_S = 2.0  # chosen: a link without any message for this time counts as cut
+MEASURED_EVERY_S = 1.0  # chosen: on a full processor many RCs of one host are silent, and each question costs time
 GRANTED_BELOW_S = 0.3  # chosen: a grant needs three messages across the link, in the second that an ARC has to open
 FULL = 0.9  # chosen: over a second, so that a component mostly waits until others let it run
 
@@ -25,7 +26,7 @@ FULL = 0.9  # chosen: over a second, so that a component mostly waits until othe
 @dataclass(frozen=True, slots=True)
 class _Measured:
     host: str
-    round_trip_s: float | None
+    round_trip_s: float | None = None
     cpu: float = 0.0
 
 
@@ -38,36 +39,44 @@ class SilentHosts:
 
     def __init__(self, bus: Bus, clock: Clock, own_host: str) -> None:
         self._bus, self._clock, self._own_host = bus, clock, own_host
+        self._host_of: dict[str, str] = {}
         self._measured: dict[str, _Measured] = {}
+        self._asked_s: dict[str, float] = {}
 
     async def measure(self, rc: str) -> None:
-        """Measure the round trip to the creator of the RC's host, and ask it for the load."""
+        """Measure the round trip to the creator of the RC's host, and ask it for the load.
+
+        RCs of one host share a measurement for ``MEASURED_EVERY_S``.
+        """
         try:
             found = await self._bus.ask(NAMESERVER, Resolve(rc), Resolved, within_s=MEASURED_WITHIN_S)
         except (LinkError, Refusal):  # it is gone: its absence has other causes
             self.forget(rc)
             return
-        host, asked_s = found.component.host, self._clock.now_s()
-        measured = _Measured(host, None)
-        with suppress(LinkError):
-            cpu = await self._cpu(host)
-            measured = _Measured(host, (self._clock.now_s() - asked_s) / self._clock.rate, cpu)
-        self._measured[rc] = measured
+        host, now_s = found.component.host, self._clock.now_s()
+        self._host_of[rc] = host
+        if now_s - self._asked_s.get(host, -math.inf) < MEASURED_EVERY_S * self._clock.rate:
+            return
+        self._asked_s[host] = now_s
+        self._measured[host] = await self._ask(host, now_s)
 
     def forget(self, name: str) -> None:
         """Forget what was measured for this component."""
-        self._measured.pop(name, None)
+        self._host_of.pop(name, None)
 
-    async def _cpu(self, host: str) -> float:
+    async def _ask(self, host: str, asked_s: float) -> _Measured:
         creator = address(Subsystem.BACKBONE, creator_name(host))
         try:
-            return (await self._bus.ask(creator, AskLoad(), HostLoad, within_s=MEASURED_WITHIN_S)).cpu
+            cpu = (await self._bus.ask(creator, AskLoad(), HostLoad, within_s=MEASURED_WITHIN_S)).cpu
         except Refusal:  # an answer, too, of a creator that ends
-            return 0.0
+            cpu = 0.0
+        except LinkError:
+            return _Measured(host)
+        return _Measured(host, (self._clock.now_s() - asked_s) / self._clock.rate, cpu)
 
     def remedy(self, rc: str) -> str:
         """Return the remedy for an RC on a full host, or behind a slow or silent link; empty: neither is the cause."""
-        measured = self._measured.get(rc)
+        measured = self._measured.get(self._host_of.get(rc, ""))
         if measured is None:
             return ""
         if measured.cpu >= FULL:

@@ -13,6 +13,8 @@ from backbone.component.messages import Absence, AskState, ComponentState
 from backbone.creator.messages import AskLoad, HostLoad
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.nameserver.messages import Components
+from backbone.nameserver.registry import Registry
 from backbone.placer.messages import Start, Started
 from backbone.rc_manager.failures import WORKS_AGAIN_S
 from backbone.rc_manager.messages import AskRc, Connect, Disconnect, RcState
@@ -102,6 +104,43 @@ def test_the_remedy_for_an_rc_that_does_not_answer_names_a_slow_link_or_a_full_p
             await creator.close()
 
     run_virtual(main())
+
+
+def test_silent_rcs_of_one_host_cost_no_lists_and_one_measurement_a_second(
+    pool: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lists: list[str] = []
+    loads: list[Envelope[AskLoad]] = []
+    components = Registry.components
+
+    def counted(registry: Registry, *of: Any) -> Components:
+        lists.append("asked for")
+        return components(registry, *of)
+
+    monkeypatch.setattr(Registry, "components", counted)
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            creator = here.network.join("backbone/creator-here", here.clock)
+
+            async def answer(asked: Envelope[AskLoad]) -> Message:
+                loads.append(asked)
+                return HostLoad("here", [], 1.0, 0.5, 2, 3)
+
+            creator.serve("backbone/creator-here", AskLoad, answer)
+            for name, rc in here.rcs.items():
+                rc.hangs = True
+                asker = await here.arc(f"asker-{name}")
+                await asker.ask_for(request(asker.name, name))
+            lists.clear()
+            await here.clock.sleep_s(10.0)
+            absent = await _absent(asker)
+            assert all("run less on here" in absent[name].remedy for name in here.rcs)
+            await creator.close()
+
+    run_virtual(main())
+    assert not lists
+    assert 1 <= len(loads) <= 11
 
 
 def test_an_rc_that_does_not_answer_is_named(pool: Any) -> None:
