@@ -12,9 +12,10 @@ from collections.abc import Iterable
 from enum import StrEnum
 
 from backbone.errors import Refusal
+from backbone.incarnation import Incarnation
 
 MAX_NAME_LENGTH = 63  # chosen: the longest label of a host name (RFC 1035), names may become host labels
-MAX_PID_DIGITS = 7  # Linux: PID_MAX_LIMIT is 4194304
+_HOLDER = re.compile(r"(.+)\.([0-9]{1,7})\.([0-9]{1,15})")  # Linux: PID_MAX_LIMIT is 4194304; 15: six bytes
 _COUNTED = re.compile(r"(\D*)(\d{0,18})")  # chosen: a longer number is several
 _LEGAL = re.compile(rf"[a-z][a-z0-9_-]{{0,{MAX_NAME_LENGTH - 1}}}")
 
@@ -92,31 +93,31 @@ def component_of(component_address: str) -> str:
     return component_address.rpartition("/")[2]
 
 
-def claim_address(component_address: str, host: str, pid: int) -> str:
-    """Return the address of the claim, the token of the process that holds a name, ready or not.
+def claim_address(component_address: str, holder: Incarnation) -> str:
+    """Return the address of the claim, the token of the incarnation that holds a name, ready or not.
 
     Example:
-        >>> claim_address("resource_pool/scout1", "lab-pc", 4242)
-        'resource_pool/scout1/lab-pc.4242'
+        >>> claim_address("resource_pool/scout1", Incarnation("lab-pc", 4242, 9))
+        'resource_pool/scout1/lab-pc.4242.9'
     """
-    return f"{component_address}/{host}.{pid}"
+    return f"{component_address}/{holder.host}.{holder.pid}.{holder.start}"
 
 
-def read_claim(claim: str) -> tuple[str, str, int]:
-    """Return component address, host and pid of a claim's address.
+def read_claim(claim: str) -> tuple[str, Incarnation]:
+    """Return component address and incarnation of a claim's address.
 
     Example:
-        >>> read_claim("resource_pool/scout1/lab-pc.4242")
-        ('resource_pool/scout1', 'lab-pc', 4242)
+        >>> read_claim("resource_pool/scout1/lab-pc.4242.9")
+        ('resource_pool/scout1', Incarnation(host='lab-pc', pid=4242, start=9))
 
     Raises:
         IllegalName: The text is no address of a claim.
     """
     component_address, _, process = claim.rpartition("/")
-    host, _, pid = process.rpartition(".")
-    if not (is_component(component_address) and host and pid.isdecimal() and len(pid) <= MAX_PID_DIGITS):
+    found = _HOLDER.fullmatch(process)
+    if found is None or not is_component(component_address):
         raise IllegalName(f"{claim!r} is not the address of a claim")
-    return component_address, host, int(pid)
+    return component_address, Incarnation(found[1], int(found[2]), int(found[3]))
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

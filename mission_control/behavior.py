@@ -239,7 +239,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     def go_on_from(self, other: Self) -> None:
         """Take over the state of another implementation: exchanges, story, progress, grants and place in the tree."""
         self.exchanges, self.story, self.payload = other.exchanges, other.story, other.payload
-        self.tree_version, self.pid = other.tree_version, other.pid
+        self.tree_version, self.pid, self.start_number = other.tree_version, other.pid, other.start_number
         self.own_arc.go_on_from(other.own_arc)
 
     def take_charge(self) -> None:

@@ -24,20 +24,14 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.abilities import NO_ABILITIES, Abilities
 from backbone.component.common_answers import CommonAnswers
 from backbone.component.launch import Launch
-from backbone.component.messages import (
-    Absence,
-    CommonQuestion,
-    ComponentState,
-    LifeState,
-    LogLevel,
-    StandingStop,
-)
+from backbone.component.messages import Absence, CommonQuestion, ComponentState, LifeState, LogLevel, StandingStop
 from backbone.component.name_claim import claim_name
 from backbone.component.own_tasks import OwnTasks
 from backbone.component.parameter_values import parameters_from
 from backbone.component.story import StoryBook, feedback_of
 from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
+from backbone.incarnation import random_start
 from backbone.keys import Conversation
 from backbone.printable_text import printable
 from backbone.waiting import first_of, only_bugs
@@ -117,8 +111,8 @@ class Component(Generic[P_co]):
         self.launch, self.bus, self.clock = launch, bus, clock
         self.address = launch.address
         """``<subsystem>/<name>``."""
-        self.pid = os.getpid()
-        """Pid of its process. A simulation, where many components share one process, sets other numbers."""
+        self.pid, self.start_number = os.getpid(), random_start()
+        """Pid of its process, and number of this life. A simulation sets other numbers."""
         self.parameters: P_co = cast(P_co, parameters_from(launch.parameters, self.parameters_type, launch.name))
         self.story = StoryBook(self.address, clock)
         self.feedback = ""
@@ -302,6 +296,7 @@ class Component(Generic[P_co]):
             self.standing_stop(),
             self.person(),
             self.is_robot,
+            self.start_number,
         )
 
     async def run(self) -> None:

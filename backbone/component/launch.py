@@ -23,7 +23,7 @@ class Launch(Message, frozen=True):
         run_directory: Folder of the mission's files on this host; removed when the mission has ended.
         process: Name of the shared process; empty: a process of its own. Without a class path this is the launch of
             the shared process itself, and ``requester`` is its creator.
-        incarnation: Id of this life of the component, ``<host>.<pid of the creator>.<number>``, unique in the
+        incarnation: Id of this life of the component, ``<host>.<start of the creator>.<number>``, unique in the
             mission.
     """
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from backbone.component.log_level import LogLevel as LogLevel  # noqa: PLC0414  a part of these messages
 from backbone.errors import Refusal
+from backbone.incarnation import Incarnation, Start
 from backbone.ranges import FEW, MANY, Address, Count, Instant, MachineTime, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
@@ -98,6 +99,7 @@ class ComponentState(Message, frozen=True, tag="ComponentState/2"):
         stop: The emergency stop in force on it; None: no stop.
         user: Name of the person at it, as the person gave it; empty: no person.
         is_robot: True for the RC of a robot, which operators can stop.
+        start: Random number of this life, see ``incarnation``.
     """
 
     address: Address
@@ -112,6 +114,12 @@ class ComponentState(Message, frozen=True, tag="ComponentState/2"):
     stop: StandingStop | None = None
     user: Mention = ""
     is_robot: bool = False
+    start: Start = 0
+
+    @property
+    def incarnation(self) -> Incarnation:
+        """This life of the component."""
+        return Incarnation(self.host, self.pid, self.start)
 
 
 class Register(Message, frozen=True):

@@ -35,7 +35,7 @@ async def claim_name(bus: Bus, clock: Clock, state: ComponentState) -> StandingS
             if not _is_of_the_dead(taken, state.host) or clock.now_s() >= until_s:
                 raise
         await clock.sleep_s(REGISTER_AGAIN_S * clock.rate)
-    bus.declare_alive(claim_address(state.address, state.host, state.pid))
+    bus.declare_alive(claim_address(state.address, state.incarnation))
     return registered.stop
 
 

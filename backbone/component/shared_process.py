@@ -41,6 +41,7 @@ from backbone.component.membership import (
 from backbone.component.messages import LogLevel
 from backbone.component.process import exit_code_of, run_to_end, run_with_heartbeat
 from backbone.component.stray_faults import strays_told
+from backbone.incarnation import random_start
 from backbone.waiting import end_tasks, only_bugs
 from backbone.wire import Envelope, Message, UnknownMessage
 
@@ -86,11 +87,20 @@ class SharedProcess:
         launch: Launch of the process itself; see ``Launch.process``.
         join: Returns a bus for a source; all these buses are neighbors.
         clock: The mission's clock, for all members.
+        start_of: Returns the start of a new member's incarnation.
     """
 
-    def __init__(self, launch: Launch, join: Callable[[str, Clock], Bus], clock: Clock, pid: int) -> None:
+    def __init__(
+        self,
+        launch: Launch,
+        join: Callable[[str, Clock], Bus],
+        clock: Clock,
+        pid: int,
+        start_of: Callable[[], int] = random_start,
+    ) -> None:
         self.address = process_address(launch.host, launch.process, pid)
         self._launch, self._join, self._clock, self._pid = launch, join, clock, pid
+        self._start_of = start_of
         self._members: dict[int, _Member] = {}
         self._lives: dict[int, asyncio.Task[None]] = {}
         self._end = asyncio.Event()
@@ -192,7 +202,7 @@ class SharedProcess:
         except BaseException:
             await bus.close()
             raise
-        component.pid = self._pid
+        component.pid, component.start_number = self._pid, self._start_of()
         member.component = component
         await component.run()
 

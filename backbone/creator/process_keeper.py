@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 from collections.abc import Callable, Coroutine
 from typing import assert_never
 
@@ -54,6 +53,7 @@ from backbone.creator.silence import LOOK_EVERY_S
 from backbone.creator.supervision import Phase, Supervision
 from backbone.creator.zygote import Forks, NoProcess
 from backbone.errors import BackboneError
+from backbone.incarnation import random_start
 from backbone.naming import IllegalName, component_of
 from backbone.waiting import end_tasks
 
@@ -70,7 +70,7 @@ class ProcessKeeper:
         zygote: Forks the processes; the keeper sets its ``on_exit``, the caller closes it.
         clock: Clock of back-off and deadlines, which are in seconds of the machine; None: the machine's own.
         read_vitals: Reads the vitals of a process, given run directory and pid; see ``heartbeat.read_vitals``.
-        pid: Pid of the keeper, which is part of each incarnation that it starts; 0: this process.
+        start: Start of the keeper's incarnation, which is part of each that it starts; 0: a random number.
 
     Attributes:
         on_fell: Called when a process ended unexpectedly.
@@ -80,7 +80,7 @@ class ProcessKeeper:
     """
 
     def __init__(
-        self, zygote: Forks, clock: Clock | None = None, read_vitals: ReadVitals = read_vitals, pid: int = 0
+        self, zygote: Forks, clock: Clock | None = None, read_vitals: ReadVitals = read_vitals, start: int = 0
     ) -> None:
         self.on_fell: Callable[[ProcessFell], None] = _ignore
         self.on_silent: Callable[[str, float], None] = _ignore
@@ -104,7 +104,7 @@ class ProcessKeeper:
         self._looking: asyncio.Task[None] | None = None
         self._alarm = Alarm(self._clock, self._task, self._woken, "supervision's alarm")
         self._is_closing = False
-        self._lives, self._pid = 0, pid or os.getpid()
+        self._lives, self._start = 0, start or random_start()
         zygote.on_exit = self._exited
 
     def use(self, bus: Bus) -> None:
@@ -367,7 +367,7 @@ class ProcessKeeper:
     def _begin_life(self, kept: Kept, forked: asyncio.Future[int] | None) -> None:
         self._lives += 1
         launch = kept.launch
-        incarnation = f"{launch.host}.{self._pid}.{self._lives}"
+        incarnation = f"{launch.host}.{self._start}.{self._lives}"
         launch = kept.launch = msgspec.structs.replace(launch, incarnation=incarnation)
         if launch.process:
             self._shared.wanted(launch)

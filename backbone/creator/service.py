@@ -107,7 +107,7 @@ class Creator(Component[CreatorParameters]):
         self._zygote.on_lost = lambda: self.publish_event(
             self.name, "lost its zygote and with it all its components", LogLevel.ALARM
         )
-        self._keeper = ProcessKeeper(self._zygote, self.clock, self._read_vitals, self.pid)
+        self._keeper = ProcessKeeper(self._zygote, self.clock, self._read_vitals, self.start_number)
         self._keeper.on_fell = self._component_fell
         self._keeper.on_silent = self._component_silent
         self._keeper.on_changed = self._processes_changed

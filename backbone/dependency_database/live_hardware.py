@@ -25,6 +25,7 @@ from backbone.bus.interface import Bus
 from backbone.component.messages import AskParameters, ComponentState, LifeState, Parameters
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
+from backbone.incarnation import Incarnation
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
@@ -60,7 +61,7 @@ class LiveHardware:
         self.is_sure = False
         self._bus, self._note = bus, note
         self._strangers: dict[str, str] = {}  # name → why it does not count
-        self._lives: dict[str, tuple[str, int]] = {}
+        self._lives: dict[str, Incarnation] = {}
         self._alone = asyncio.Lock()
 
     async def compare(self, declared: Sequence[Resource], kinds: Collection[str]) -> bool:
@@ -94,7 +95,7 @@ class LiveHardware:
             return self.resources != before
 
     async def _take_in(self, component: ComponentState, like: Resource | None) -> None:
-        name, life = component_of(component.address), (component.host, component.pid)
+        name, life = component_of(component.address), component.incarnation
         if self._lives.get(name) == life:
             return
         try:

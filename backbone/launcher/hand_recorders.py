@@ -67,7 +67,7 @@ class HandRecorders:
 
     def beat_came(self, source: str, beat: RecorderBeat, now_s: float) -> list[Event]:
         """Record a beat; return what to log."""
-        claim, name = claim_address(source, beat.host, beat.pid), component_of(source)
+        claim, name = claim_address(source, beat.incarnation), component_of(source)
         known = self._known.get(claim)
         if beat.is_last or not name.startswith(NAME_BEGIN):
             self._known.pop(claim, None)

@@ -195,7 +195,7 @@ class MachineOffer(Component[NoParameters]):
             holder = (await self.bus.ask(NAMESERVER, Resolve(self.name), Resolved, within_s=REPLY_TIME_S)).component
         except (UnknownName, LinkError):
             return False
-        return holder.pid != self.pid
+        return holder.incarnation != self.component_state().incarnation
 
     def _end_as(self, ending: Ending) -> None:
         self.ending = ending

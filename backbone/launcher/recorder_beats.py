@@ -12,7 +12,10 @@ import socket
 import time
 from pathlib import Path
 
+import msgspec
+
 from backbone.bus.interface import Bus
+from backbone.incarnation import Incarnation, Start, random_start
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address, claim_address
 from backbone.ranges import Line, Mention, Pid
@@ -28,6 +31,7 @@ class RecorderBeat(Message, frozen=True):
     Attributes:
         host: Host name of its machine.
         pid: Process id on that machine.
+        start: Random number of this recorder, see ``incarnation``.
         file: The first file of its recording, for people.
         is_last: True if the recording is complete and the recorder ends.
     """
@@ -36,6 +40,12 @@ class RecorderBeat(Message, frozen=True):
     pid: Pid
     file: Line
     is_last: bool = False
+    start: Start = 0
+
+    @property
+    def incarnation(self) -> Incarnation:
+        """This run of the recorder."""
+        return Incarnation(self.host, self.pid, self.start)
 
 
 def address_of_recorder() -> str:
@@ -52,8 +62,9 @@ class RecorderBeats:
 
     def __init__(self, bus: Bus, file: Path) -> None:
         self._bus, self._next_s = bus, 0.0
-        self._host, self._pid, self._file = socket.gethostname(), os.getpid(), str(file.absolute())
-        bus.declare_alive(claim_address(bus.source, self._host, self._pid))
+        beat = RecorderBeat(socket.gethostname(), os.getpid(), str(file.absolute()), start=random_start())
+        self._beat = beat
+        bus.declare_alive(claim_address(bus.source, beat.incarnation))
         self.give()
 
     def give(self) -> None:
@@ -68,5 +79,5 @@ class RecorderBeats:
         self._publish(is_last=True)
 
     def _publish(self, *, is_last: bool = False) -> None:
-        beat = RecorderBeat(self._host, self._pid, self._file, is_last)
+        beat = msgspec.structs.replace(self._beat, is_last=is_last)
         self._bus.publish(self._bus.source, Conversation.BEAT, beat)

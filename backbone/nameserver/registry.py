@@ -3,10 +3,10 @@
 Events go in (a component registers or introduces itself, a token begins or ends), instructions come out. The caller
 owns the bus and the clock.
 
-Every component declares two tokens: its *claim*, with host and pid, after its registration, and its liveliness *token*
-when it is ready. A component holds its name while one of them exists. Until the claim exists, the registry keeps the
-name for ``CLAIM_WITHIN_S``. Without claims, a process that died before its readiness would block the name for its
-successor.
+Every component declares two tokens: its *claim*, which names its incarnation, after its registration, and its
+liveliness *token* when it is ready. A component holds its name while one of them exists. Until the claim exists, the
+registry keeps the name for ``CLAIM_WITHIN_S``. Without claims, a process that died before its readiness would block the
+name for its successor.
 
 Rules:
 
@@ -24,6 +24,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from backbone.component.messages import ComponentState, LifeState, NameTaken, StandingStop
+from backbone.incarnation import Incarnation
 from backbone.nameserver.messages import Appeared, Components, Disappeared, UnknownName
 from backbone.naming import component_of, did_you_mean
 
@@ -50,8 +51,7 @@ Instruction = Announce | Introduce
 @dataclass(frozen=True, slots=True)
 class _Claim:
     address: str
-    host: str
-    pid: int
+    holder: Incarnation
 
 
 @dataclass(slots=True)
@@ -61,7 +61,7 @@ class _Entry:
     Attributes:
         state: Its holder; None while only tokens are known.
         given_s: Mission time of the registration.
-        claims: Processes with a claim to the name; two only after a restart of the hub.
+        claims: Components with a claim to the name; two only after a restart of the hub.
         tokens: Addresses under which a component of this name is ready.
         announced: True if ``Appeared`` was published for its present token.
     """
@@ -109,7 +109,7 @@ class Registry:
         self._forget_unclaimed(now_s)
         name = component_of(newcomer.address)
         entry = self._entries.setdefault(name, _Entry())
-        if entry.state is not None and _same_process(entry.state, newcomer) and entry.state.since_s == newcomer.since_s:
+        if entry.state is not None and _is_same(entry.state, newcomer) and entry.state.since_s == newcomer.since_s:
             entry.given_s = now_s
             return
         holder = _holder(entry)
@@ -123,9 +123,9 @@ class Registry:
             )
         entry.state, entry.given_s = newcomer, now_s
 
-    def claim_changed(self, address: str, host: str, pid: int, *, stands: bool) -> None:
-        """Record that a claim of a process began or ended."""
-        name, claim = component_of(address), _Claim(address, host, pid)
+    def claim_changed(self, address: str, holder: Incarnation, *, stands: bool) -> None:
+        """Record that a claim began or ended."""
+        name, claim = component_of(address), _Claim(address, holder)
         if stands:
             self._entries.setdefault(name, _Entry()).claims.add(claim)
         elif name in self._entries:
@@ -171,7 +171,7 @@ class Registry:
             entry is not None
             and state.address in entry.tokens
             and entry.state is not None
-            and _same_process(entry.state, state)
+            and _is_same(entry.state, state)
         ):
             self._record(entry, state)
 
@@ -264,22 +264,23 @@ def _holder(entry: _Entry) -> ComponentState | None:
     if entry.state is not None:
         return entry.state
     if entry.claims:
-        claim = min(entry.claims, key=lambda claim: (claim.address, claim.host, claim.pid))
-        return ComponentState(claim.address, "", claim.host, claim.pid, LifeState.CONNECTING, 0.0)
+        claim = min(entry.claims, key=lambda claim: (claim.address, claim.holder))
+        host, pid, start = claim.holder
+        return ComponentState(claim.address, "", host, pid, LifeState.CONNECTING, 0.0, start=start)
     if entry.tokens:
         return ComponentState(min(entry.tokens), "", "", 0, LifeState.READY, 0.0)
     return None
 
 
 def _is_held_by_another(entry: _Entry, state: ComponentState) -> bool:
-    """Return whether the claim of another process than this one holds the name."""
+    """Return whether the claim of another component than this one holds the name."""
     holder = entry.state
     return (
         holder is not None
-        and not _same_process(holder, state)
-        and _Claim(holder.address, holder.host, holder.pid) in entry.claims
+        and not _is_same(holder, state)
+        and _Claim(holder.address, holder.incarnation) in entry.claims
     )
 
 
-def _same_process(one: ComponentState, other: ComponentState) -> bool:
-    return (one.address, one.host, one.pid) == (other.address, other.host, other.pid)
+def _is_same(one: ComponentState, other: ComponentState) -> bool:
+    return (one.address, one.incarnation) == (other.address, other.incarnation)

@@ -104,7 +104,7 @@ class Nameserver(Component[NameserverParameters]):
     async def connect(self) -> None:
         """Register itself and watch every token from the first one on."""
         self._registry.registered(self.component_state(), self.clock.now_s())
-        self._registry.claim_changed(self.address, self.launch.host, self.pid, stands=True)
+        self._registry.claim_changed(self.address, self.component_state().incarnation, stands=True)
         self.bus.watch_alive("*/*/*", self._claim_changed)
         self.bus.watch_alive("*/*", self._token_changed)
         self.bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._status_published)
@@ -161,11 +161,11 @@ class Nameserver(Component[NameserverParameters]):
 
     def _claim_changed(self, claim: str, stands: bool) -> None:
         try:
-            address, host, pid = read_claim(claim)
+            address, holder = read_claim(claim)
         except IllegalName as illegal:  # a token of an unknown client must not end the hub
             self.story.note(claim, f"ignored: {illegal.detail}")
             return
-        self._registry.claim_changed(address, host, pid, stands=stands)
+        self._registry.claim_changed(address, holder, stands=stands)
 
     def _token_changed(self, address: str, stands: bool) -> None:
         if not is_component(address):  # of an unknown client: no component would ever answer there

@@ -89,7 +89,7 @@ class Meetings:
     def _creator_status_heard(self, heard: Envelope[ComponentState]) -> None:
         """Place a creator's components again as soon as it drains; its token exists until it has ended them."""
         creator = heard.body
-        if creator.state in LEAVING and self._book.knows_creator(creator.host, creator.pid):
+        if creator.state in LEAVING and self._book.knows_creator(creator.host, creator.start):
             self._carry_out(self._book.creator_down(creator.host, self._clock.now_s()))
 
     async def look_again(self) -> None:
@@ -101,7 +101,7 @@ class Meetings:
                 self._note(component_of(NAMESERVER), f"does not list the creators: {error}")
                 return
             for creator in found.components:
-                if self._book.knows_creator(creator.host, creator.pid):
+                if self._book.knows_creator(creator.host, creator.start):
                     self._carry_out([Inspect(creator.host)])
                 else:
                     self.begin_meeting(creator)
@@ -121,14 +121,14 @@ class Meetings:
 
     def begin_meeting(self, creator: ComponentState) -> None:
         """Meet this creator, unless it is being met."""
-        if self._newest.get(creator.host) != creator.pid or creator.host not in self._meeting:
-            self._newest[creator.host] = creator.pid
+        if self._newest.get(creator.host) != creator.start or creator.host not in self._meeting:
+            self._newest[creator.host] = creator.start
             self._begin(partial(self.meet, creator), f"meet {creator.host}")
 
     async def meet(self, creator: ComponentState) -> None:
         """Collect a creator's tags and processes, and subscribe to its reports."""
         host, asked_s = creator.host, self._clock.now_s()
-        self._newest[host] = creator.pid
+        self._newest[host] = creator.start
         self._meeting[host] = self._meeting.get(host, 0) + 1
         if host not in self._ears:
             own = creator_of(host)
@@ -150,8 +150,8 @@ class Meetings:
             self._news.tell()
         if host != self._own_host:
             self._remember(host)
-        if self._newest[host] == creator.pid:  # else the placer meets its successor instead
-            self._carry_out(self._book.creator_up(host, answered.tags, creator.pid, answered.processes, asked_s))
+        if self._newest[host] == creator.start:  # else the placer meets its successor instead
+            self._carry_out(self._book.creator_up(host, answered.tags, creator.start, answered.processes, asked_s))
 
     async def _meet_later(self, creator: ComponentState) -> None:
         await self._clock.sleep_s(ANSWER_WITHIN_S * self._clock.rate)
@@ -159,8 +159,8 @@ class Meetings:
             found = await self._creators.listed()
         except LinkError:  # the nameserver's return makes the placer look again
             return
-        is_there = any((each.host, each.pid) == (creator.host, creator.pid) for each in found.components)
-        if is_there and not self._book.knows_creator(creator.host, creator.pid):
+        is_there = any(each.incarnation == creator.incarnation for each in found.components)
+        if is_there and not self._book.knows_creator(creator.host, creator.start):
             self.begin_meeting(creator)
 
     async def _inspect_now(self, host: str) -> None:

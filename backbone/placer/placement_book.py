@@ -42,10 +42,10 @@ STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; no mission stop
 
 @dataclass(slots=True)
 class _Host:
-    """One host: the placer's view of it without the count of components, and its creator's pid."""
+    """One host: the placer's view of it without the count of components, and the start of its creator."""
 
     view: CandidateHost
-    creator_pid: int
+    creator_start: int
     inspected: tuple[int, int] = (-1, -1)
     """Counts of components, by its creator and by the book, after the last inspection."""
 
@@ -99,9 +99,9 @@ class PlacementBook:
         """Return whether this host's creator is alive."""
         return host in self._hosts and self._hosts[host].view.alive
 
-    def knows_creator(self, host: str, pid: int) -> bool:
-        """Return whether this pid is the host's living creator."""
-        return self.is_alive(host) and self._hosts[host].creator_pid == pid
+    def knows_creator(self, host: str, start: int) -> bool:
+        """Return whether the host's living creator has this start."""
+        return self.is_alive(host) and self._hosts[host].creator_start == start
 
     def may_find_host(self, name: str) -> bool:
         """Return whether the return of a creator would make a host possible; True if no host is known."""
@@ -234,16 +234,16 @@ class PlacementBook:
             del self._stopped[next(iter(self._stopped))]
 
     def creator_up(
-        self, host: str, tags: Collection[str], creator_pid: int, processes: Collection[ProcessState], asked_s: float
+        self, host: str, tags: Collection[str], creator_start: int, processes: Collection[ProcessState], asked_s: float
     ) -> list[Instruction]:
         """Enter a creator's answer to a question of that mission time, and place waiting components again."""
         instructions: list[Instruction] = []
-        if self.is_alive(host) and not self.knows_creator(host, creator_pid):
+        if self.is_alive(host) and not self.knows_creator(host, creator_start):
             instructions += self.creator_down(host, asked_s)
         old = self._hosts[host].view if host in self._hosts else CandidateHost(host)
         if not self.is_alive(host):
             instructions.append(Note(host, f"has a creator; its tags: {', '.join(sorted(tags)) or 'none'}"))
-        self._hosts[host] = _Host(replace(old, tags=frozenset(tags), alive=True), creator_pid)
+        self._hosts[host] = _Host(replace(old, tags=frozenset(tags), alive=True), creator_start)
         for process in processes:
             instructions += self._found(host, process, asked_s)
         self._left_behind = {(where, name) for where, name in self._left_behind if where != host}

@@ -168,7 +168,7 @@ async def _live(network: _RecordedNetwork, clock: Clock, component: RealComponen
     try:
         current_cause.set(life.begin_cause)
         made = component.make(component.launch, bus, clock)
-        made.pid = life.pid
+        made.pid, made.start_number = life.pid, life.start
         await made.run()
     finally:
         await bus.close()
@@ -180,12 +180,13 @@ def _bug_of(task: asyncio.Task[None]) -> BaseException | None:
 
 @dataclass(slots=True)
 class _RecordedLife:
-    """The recorded life of a component: mission times of its first and last message, cause of the first, and pid."""
+    """The recorded life of a component: times of its first and last message, cause of the first, pid, start."""
 
     begin_s: float = -1.0
     end_s: float = 0.0
     begin_cause: str = ""
     pid: int = 0
+    start: int = 0
 
 
 class _RecordedNetwork(LocalNetwork):
@@ -217,7 +218,7 @@ class _RecordedNetwork(LocalNetwork):
                 if is_elsewhere and (said := message_as_sent(self._classes, message)) is not None:
                     asked[message.id] = message.source, address, said
                 if not life.pid and message.schema == schema_of(ComponentState):
-                    life.pid = int(message.body["pid"])
+                    life.pid, life.start = int(message.body["pid"]), int(message.body.get("start", 0))
             elif is_asked and message.cause in asked and asked[message.cause][1] == message.source == address:
                 answer = message_as_sent(self._classes, message)
                 if answer is not None:

@@ -7,6 +7,7 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.incarnation import Incarnation
 from backbone.keys import Conversation, address_of, key
 from backbone.naming import IllegalName, Subsystem, address, claim_address
 
@@ -22,9 +23,9 @@ def test_the_address_is_read_back_from_a_key(
     assert zenoh.KeyExpr(key(mission, where, conversation))
 
 
-@given(names, names, st.integers(1, 2**22))
-def test_the_address_of_a_claim_is_read_back_too(name: str, host: str, pid: int) -> None:
-    claim = claim_address(address(Subsystem.BACKBONE, name), host, pid)
+@given(names, names, st.integers(1, 2**22), st.integers(0, 2**48 - 1))
+def test_the_address_of_a_claim_is_read_back_too(name: str, host: str, pid: int, start: int) -> None:
+    claim = claim_address(address(Subsystem.BACKBONE, name), Incarnation(host, pid, start))
     assert address_of(key("m", claim, Conversation.ALIVE)) == claim
 
 

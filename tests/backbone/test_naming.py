@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.incarnation import Incarnation
 from backbone.naming import (
     MAX_NAME_LENGTH,
     IllegalName,
@@ -46,14 +47,25 @@ def test_illegal_names(name: str) -> None:
         address(Subsystem.BACKBONE, name)
 
 
-@given(names, names, st.integers(1, 2**22))
-def test_a_claim_is_read_back(name: str, host: str, pid: int) -> None:
-    where = address(Subsystem.BACKBONE, name)
-    assert read_claim(claim_address(where, host, pid)) == (where, host, pid)
+@given(names, names, st.integers(1, 2**22), st.integers(0, 2**48 - 1))
+def test_a_claim_is_read_back(name: str, host: str, pid: int, start: int) -> None:
+    where, holder = address(Subsystem.BACKBONE, name), Incarnation(host, pid, start)
+    assert read_claim(claim_address(where, holder)) == (where, holder)
 
 
 @pytest.mark.parametrize(
-    "claim", ["", "backbone/nameserver", "a/b/host", "a/b/.1", "a/b/host.", "a/b/host.x", "host.1"]
+    "claim",
+    [
+        "",
+        "backbone/nameserver",
+        "a/b/host",
+        "a/b/.1.2",
+        "a/b/host.",
+        "a/b/host.1",
+        "a/b/host.x.1",
+        "a/b/host.1.x",
+        "host.1.2",
+    ],
 )
 def test_what_is_no_claim_is_refused(claim: str) -> None:
     with pytest.raises(IllegalName):

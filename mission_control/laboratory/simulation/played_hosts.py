@@ -164,7 +164,7 @@ class PlayedHosts:
             await bus.close()
             self._audit.note(role.name, "gives up", error=f"{type(refusal).__name__}: {refusal}")
             return
-        component.pid = PID
+        component.pid = component.start_number = PID
         life.component = component
         self._audit.note(role.name, "begins")
         watching = bus.watch_alive(launch.address, lambda _, alive: life.ready.set() if alive else life.ready.clear())

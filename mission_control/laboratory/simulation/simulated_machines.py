@@ -154,9 +154,9 @@ class Machines:
 
     def _born(self, process: SimulatedProcess, launch: Launch, clock: Clock) -> AnyComponent | SharedProcess:
         if launch.is_shared_process:
-            return SharedProcess(launch, self.network.join, clock, process.pid)
+            return SharedProcess(launch, self.network.join, clock, process.pid, lambda: process.pid)
         component = load_class(launch.class_path)(launch, self.network.join(launch.address, clock), clock)
-        component.pid = process.pid
+        component.pid = component.start_number = process.pid
         return component
 
     def _note_end(self, process: SimulatedProcess, error: Exception) -> int:

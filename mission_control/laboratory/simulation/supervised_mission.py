@@ -172,7 +172,7 @@ class _SupervisedMission:
             observer=_Observer(),
             began_s=0.0,
         )
-        launcher.pid = process.pid
+        launcher.pid = launcher.start_number = process.pid
         self._machines.lives[process] = launcher
         keeper.on_fell = self._note_also(keeper.on_fell)
         ready.set_result(launcher)

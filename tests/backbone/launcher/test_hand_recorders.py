@@ -28,7 +28,7 @@ from backbone.waiting import end_tasks
 SOURCE, HOST = "backbone/recorder-7", "lab-pc"
 BEAT = RecorderBeat(HOST, 7, "/tmp/night.mcap")  # noqa: S108  no file is written
 LAST = RecorderBeat(HOST, 7, "/tmp/night.mcap", is_last=True)  # noqa: S108  no file is written
-CLAIM = claim_address(SOURCE, HOST, 7)
+CLAIM = claim_address(SOURCE, BEAT.incarnation)
 LINK_LEASE_S = 2.0
 
 
@@ -129,7 +129,7 @@ def test_one_of_another_host_is_named_for_a_time() -> None:
     watched, beat = Watched(), RecorderBeat("far", 7, "x.mcap")
     watched.hear(beat)
     watched.look(LINK_LEASE_S)
-    watched.recorders.claim_changed(claim_address(SOURCE, "far", 7), watched.now_s, stands=False)
+    watched.recorders.claim_changed(claim_address(SOURCE, beat.incarnation), watched.now_s, stands=False)
     watched.look(NAMED_FOR_S - 1.0)
     [absence] = watched.recorders.absences()
     assert absence.remedy.startswith(

@@ -189,14 +189,16 @@ async def test_a_machine_whose_clock_has_drifted_says_so(
         assert scene.creator.runs
 
 
+@pytest.mark.parametrize("pids_between", [1, 0], ids=["another pid", "equal pids, as in containers"])
 async def test_a_machine_whose_name_was_given_away_while_it_was_cut_off_ends_what_runs_here(
-    on_a_cable: Callable[..., Any],
+    on_a_cable: Callable[..., Any], pids_between: int
 ) -> None:
     async with on_a_cable() as scene:
         for tokens in list(scene.bus.network.tokens.values()):
             for token in [token for token in tokens if token.owner is scene.bus]:
                 token.close()
-        other = msgspec.structs.replace(scene.offer.component_state(), pid=scene.offer.pid + 1)
+        own = scene.offer.component_state()
+        other = msgspec.structs.replace(own, pid=own.pid + pids_between, start=own.start - 1)
         await claim_name(scene.tester, scene.tester_clock, other)
         scene.bus.link_changed(False)
         scene.bus.link_changed(True)

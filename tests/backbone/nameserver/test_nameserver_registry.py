@@ -9,24 +9,30 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import ComponentState, LifeState, NameTaken, StandingStop
 from backbone.errors import Refusal
+from backbone.incarnation import Incarnation
 from backbone.nameserver.messages import Appeared, Disappeared, UnknownName
 from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Introduce, Registry
 from backbone.naming import component_of
 
 
 def state(
-    name: str = "scout1", pid: int = 1, host: str = "a", since_s: float = 0.0, subsystem: str = "resource_pool"
+    name: str = "scout1",
+    pid: int = 1,
+    host: str = "a",
+    since_s: float = 0.0,
+    subsystem: str = "resource_pool",
+    start: int = 0,
 ) -> ComponentState:
-    return ComponentState(f"{subsystem}/{name}", "scout", host, pid, LifeState.CONNECTING, since_s)
+    return ComponentState(f"{subsystem}/{name}", "scout", host, pid, LifeState.CONNECTING, since_s, start=start)
 
 
 def begun(registry: Registry, who: ComponentState) -> None:
     registry.registered(who, 0.0)
-    registry.claim_changed(who.address, who.host, who.pid, stands=True)
+    registry.claim_changed(who.address, who.incarnation, stands=True)
 
 
 def gone(registry: Registry, who: ComponentState) -> list[object]:
-    registry.claim_changed(who.address, who.host, who.pid, stands=False)
+    registry.claim_changed(who.address, who.incarnation, stands=False)
     return list(registry.token_changed(who.address, stands=False, now_s=9.0))
 
 
@@ -57,14 +63,14 @@ def test_a_name_has_one_holder_and_the_dead_are_forgotten(steps: list[tuple[str,
                     registry.registered(who, 0.0)
                     holders[name] = who
             case "claim" if mine:
-                registry.claim_changed(who.address, who.host, who.pid, stands=True)
+                registry.claim_changed(who.address, who.incarnation, stands=True)
                 claimed.add(name)
             case "ready" if mine and name in claimed:
                 registry.token_changed(who.address, stands=True, now_s=0.0)
                 ready.add(name)
             case "die" if mine and name in claimed:
                 del holders[name]
-                registry.claim_changed(who.address, who.host, who.pid, stands=False)
+                registry.claim_changed(who.address, who.incarnation, stands=False)
                 told = registry.token_changed(who.address, stands=False, now_s=0.0)
                 assert told == ([Announce(Disappeared(who.address))] if name in ready else [])
                 claimed.discard(name)
@@ -87,7 +93,7 @@ def test_every_question_is_answered_or_refused_whatever_came_before(
         try:
             match act:
                 case "claim":
-                    registry.claim_changed(who.address, who.host, who.pid, stands=True)
+                    registry.claim_changed(who.address, who.incarnation, stands=True)
                 case "register":
                     registry.registered(who, 0.0)
                 case "ready":
@@ -151,17 +157,22 @@ def test_a_process_that_dies_before_its_claim_was_seen_keeps_its_name_for_a_mome
     assert registry.resolve("scout1", 6.0).pid == 2
 
 
-def test_who_comes_back_to_a_name_that_was_given_away_does_not_get_it() -> None:
+@pytest.mark.parametrize("second_pid", [2, 1], ids=["another pid", "two machines with one host name and equal pids"])
+def test_who_comes_back_to_a_name_that_was_given_away_does_not_get_it(second_pid: int) -> None:
     registry = Registry(0.0, 0.0)
-    for pid in (1, 2):
-        begun(registry, state(pid=pid))
-        registry.token_changed("resource_pool/scout1", stands=True, now_s=1.0)
-        if pid == 1:  # its link is cut
-            gone(registry, state(pid=1))
-    registry.claim_changed("resource_pool/scout1", "a", 1, stands=True)
-    registry.token_changed("resource_pool/scout1", stands=True, now_s=2.0)
-    assert registry.introduced(state(pid=1)) == []
-    assert registry.resolve("scout1", 2.0).pid == 2
+    first, second = state(pid=1, start=7), state(pid=second_pid, start=8)
+    begun(registry, first)
+    registry.token_changed(first.address, stands=True, now_s=1.0)
+    gone(registry, first)  # its link is cut
+    begun(registry, second)
+    registry.token_changed(second.address, stands=True, now_s=1.0)
+    registry.claim_changed(first.address, first.incarnation, stands=True)
+    registry.token_changed(first.address, stands=True, now_s=2.0)
+    assert registry.introduced(first) == []
+    assert registry.resolve("scout1", 2.0).incarnation == second.incarnation
+    registry.claim_changed(first.address, first.incarnation, stands=False)
+    with pytest.raises(NameTaken):
+        registry.registered(state(pid=3, start=9), 3.0)
 
 
 def test_ready_is_announced_at_once_and_the_truth_asked_for() -> None:
@@ -203,7 +214,7 @@ def test_the_stop_of_the_last_component_of_a_name_is_kept_until_it_is_lifted(how
 
 def test_a_restarted_hub_learns_who_is_behind_the_tokens_that_come_back() -> None:
     registry = Registry(hub_since_s=10.0, reconnect_s=1.0)
-    registry.claim_changed("resource_pool/scout1", "a", 7, stands=True)
+    registry.claim_changed("resource_pool/scout1", Incarnation("a", 7), stands=True)
     assert registry.token_changed("resource_pool/scout1", stands=True, now_s=10.1) == [
         Introduce("resource_pool/scout1")
     ]

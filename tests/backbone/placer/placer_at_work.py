@@ -185,7 +185,7 @@ class Mission:
         creator = self.creators[host]
         for component in (creator, *(child for _, child, _ in creator.lives.values())):
             yield component, component.address
-            yield component, claim_address(component.address, host, component.pid)
+            yield component, claim_address(component.address, component.component_state().incarnation)
 
     async def kill_all(self) -> None:
         for name in ["placer", *[f"creator-{host}" for host in self.creators], "component_database", "nameserver"]:

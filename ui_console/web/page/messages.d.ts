@@ -99,6 +99,7 @@ export interface ComponentState {
   stop: StandingStop | null;
   user: string;
   is_robot: boolean;
+  start: number;
 }
 
 export interface ConsentView {
