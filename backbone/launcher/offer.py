@@ -25,7 +25,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, LogLevel
+from backbone.component.messages import Absence, AskTime, LogLevel, MissionTime
 from backbone.creator.messages import (
     ListProcesses,
     Processes,
@@ -34,6 +34,7 @@ from backbone.creator.messages import (
 )
 from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.launcher.kept_creator import KeptCreator, Offered, recorder_of_host
+from backbone.launcher.link_speed import LinkSpeed
 from backbone.launcher.mission_connection import REPLY_TIME_S, clock_elsewhere, mission_clock
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
@@ -46,6 +47,7 @@ OFFER_TYPE = "offer"
 CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease); a killed hub shows at once and is back within 3 s
 SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, over a slow link by 0.1 s
 COMPARE_EACH_S = 60.0  # chosen: clocks of machines drift apart by a hundredth of a second in this time
+MEASURE_EACH_S = 5.0  # chosen: a slow link is reported within 15 s, for a small message now and then
 ASK_AGAIN_S = 0.1  # chosen: the nameserver answers that soon after the hub listens
 PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s
 DIAL_TIME_S = 3.0  # chosen: longer than the retransmission of a lost first packet takes
@@ -86,6 +88,7 @@ class MachineOffer(Component[NoParameters]):
         creator.on_fell, creator.on_changed = self._creator_fell, self.changed
         self._link_up, self._link_fell = asyncio.Event(), asyncio.Event()
         self._wrong_clock: Absence | None = None
+        self._link_speed = LinkSpeed(launch.host)
         self.ending = Ending.ORDERED
 
     async def connect(self) -> None:
@@ -101,6 +104,7 @@ class MachineOffer(Component[NoParameters]):
         """Report that the machine is in the mission."""
         self.start_task(self._watch_folder(), "run folder")
         self.start_task(self._watch_clock(), "clock")
+        self.start_task(self._watch_link_speed(), "link speed")
         self._on_ready()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -110,9 +114,9 @@ class MachineOffer(Component[NoParameters]):
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
-        """Return creator and recorder while they do not run or respond, and this machine while its clock is wrong."""
+        """Return creator and recorder while they do not respond, this machine while its clock is wrong or link slow."""
         lost = self._recorder.absence() if self._recorder is not None else None
-        own = [absence for absence in (lost, self._wrong_clock) if absence is not None]
+        own = [absence for absence in (lost, self._wrong_clock, self._link_speed.absence) if absence is not None]
         return [*self._creator.absences(), *own]
 
     async def drain(self) -> None:
@@ -177,6 +181,18 @@ class MachineOffer(Component[NoParameters]):
         cause = f"its clock has drifted {abs(ahead_s):.1f} s {side} the mission's, so grants there may end early"
         remedy = "end the command there with Ctrl-C and type it again, so that it reads the mission's time"
         return Absence(self.launch.host, since_s, cause, "goes on with the wrong time", remedy, is_running=True)
+
+    async def _watch_link_speed(self) -> None:
+        while True:
+            await self.clock.sleep_s(MEASURE_EACH_S * self.clock.rate)
+            asked_s = self.clock.now_s()
+            try:
+                await self.bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)
+            except LinkError:  # the watch over the link acts on a cut
+                continue
+            now_s = self.clock.now_s()
+            if self._link_speed.measured((now_s - asked_s) / self.clock.rate, now_s):
+                self.changed()
 
     async def _is_other_time(self) -> bool:
         """Compare the clocks, retrying because the nameserver may answer a moment after the link is up."""

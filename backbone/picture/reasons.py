@@ -166,7 +166,9 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
     )
     told = await story_of(bus, text, clock) if asked.message else FoundEvents(())
     remarks = [*host_remarks(name, picture), *person_remarks(name, picture)]
-    if not isinstance(resolved, Resolved):
+    if isinstance(resolved, Resolved):
+        remarks += absences_of_host(resolved.component, picture)
+    else:
         remarks += await _module_remarks(bus, name, picture)
     if asked.message and not told.events:
         remarks.append(
@@ -221,6 +223,11 @@ async def stopped_unit(bus: Bus, module: str, stopped: Mapping[str, str]) -> str
             start = f"scout-backbone start {EXECUTION_UNIT} --name {unit}"
             return f"{module} is a module of {unit}, which was stopped, {stopped[unit]}; start it by '{start}'"
     return ""
+
+
+def absences_of_host(component: ComponentState, picture: MissionPicture) -> list[str]:
+    """Return what is wrong with the machine of this component."""
+    return [absence_line(absence, picture.at_s) for absence in picture.health.absent if absence.name == component.host]
 
 
 def host_remarks(name: str, picture: MissionPicture) -> list[str]:

@@ -31,7 +31,8 @@ from backbone.creator.messages import (
     creator_name,
     offer_name,
 )
-from backbone.launcher import mission_recorder
+from backbone.keys import Conversation
+from backbone.launcher import link_speed, mission_recorder
 from backbone.launcher import offer as offers
 from backbone.launcher.kept_creator import Offered
 from backbone.launcher.mission_connection import mission_clock
@@ -39,6 +40,7 @@ from backbone.launcher.mission_recorder import MissionRecorder, RecorderFailed
 from backbone.launcher.offer import Ending, MachineOffer, Offering
 from backbone.naming import Subsystem
 from backbone.run_files import RunFolderUnusable
+from backbone.wire import Envelope
 
 CUT_OFF_S = 0.5
 WITHIN_S = 5.0
@@ -186,6 +188,25 @@ async def test_a_machine_whose_clock_has_drifted_says_so(
         state = await scene.tester.ask(scene.offer.address, AskState(), ComponentState, within_s=1.0)
         assert [one.name for one in state.absent] == (["far"] if told else [])
         assert all(told in one.cause and "Ctrl-C" in one.remedy for one in state.absent)
+        assert scene.creator.runs
+
+
+async def test_a_machine_with_a_slow_link_says_so(
+    on_a_cable: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(offers, "MEASURE_EACH_S", 0.01)
+    monkeypatch.setattr(link_speed, "SLOW_S", 0.0)
+    said = asyncio.Queue[Absence]()
+
+    def hear(heard: Envelope[ComponentState]) -> None:
+        for absence in heard.body.absent:
+            said.put_nowait(absence)
+
+    async with on_a_cable() as scene:
+        scene.tester.subscribe(scene.offer.address, Conversation.STATUS, ComponentState, hear)
+        absence = await asyncio.wait_for(said.get(), WITHIN_S)
+        assert (absence.name, absence.is_running) == ("far", True)
+        assert "a round trip to the hub takes" in absence.cause
         assert scene.creator.runs
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
 import pytest
 
 from backbone.addresses import LAUNCHER, NAMESERVER
@@ -23,7 +24,8 @@ from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
 from backbone.mission_log.log import AskLog, AskPeople, Log, PeopleKnown
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.picture.reasons import AskedName, FoundEvents, Reasons, reasons_for, story_of
+from backbone.picture.mission import MissionPicture
+from backbone.picture.reasons import AskedName, FoundEvents, Reasons, absences_of_host, reasons_for, story_of
 from backbone.scheduling.views import Why
 
 CAUSE = "backbone/rc_manager#112"
@@ -103,6 +105,15 @@ def test_a_story_has_the_events_of_components_that_have_ended_and_each_event_onc
         return await story_of(bus, "scout1", VirtualClock())
 
     assert run_virtual(main()).events == [EVENTS[0], ended, EVENTS[1]]
+
+
+def test_why_a_component_does_not_work_may_be_its_machine() -> None:
+    picture, slow = MissionPicture("m"), Absence("far", 3.0, "its link is slow", "goes on", is_running=True)
+    picture.take(msgspec.structs.replace(CREATOR, address="backbone/offer-far", host="far", absent=[slow]))
+    assert absences_of_host(SCOUT, picture) == []
+    [line] = absences_of_host(msgspec.structs.replace(SCOUT, host="far"), picture)
+    assert line.startswith("far has not worked")
+    assert "its link is slow" in line
 
 
 def why(text: str) -> Reasons:
