@@ -10,7 +10,7 @@ from textual.events import Event, InputEvent, Load
 
 from ui_console.terminal.driver import KeysDropped, TerminalDriver
 
-DROPPED = "keys were dropped: this console stood still when you typed them. Press anew."
+DROPPED = "keys were dropped: this console stood still when they came, or no hand types as fast. Press anew."
 
 
 class EndingApp(App[None]):

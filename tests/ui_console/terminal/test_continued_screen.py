@@ -1,8 +1,9 @@
-"""A screen whose process was stopped and continued by signals still reads its keys, and ends."""
+"""A screen reads its keys and ends after a stop by signals, and after a paste without an end."""
 
 from __future__ import annotations
 
 import os
+import select
 import signal
 import time
 
@@ -10,7 +11,7 @@ import pytest
 from examples import rest_thorough
 from screen_on_a_terminal import WITHIN_S, screen_on_a_terminal
 
-from ui_console.terminal.driver import UNREAD_S
+from ui_console.terminal.key_gate import UNREAD_S
 
 pytestmark = pytest.mark.processes
 
@@ -72,3 +73,18 @@ def test_keys_typed_while_a_screen_was_stopped_are_dropped_but_not_the_emergency
         assert b"READ-BY" not in shown
         played.type(b"w")
         played.wait_shown(b"READ-BY-1")
+
+
+def test_a_paste_without_an_end_takes_no_stop_and_no_end() -> None:
+    with screen_on_a_terminal(PROGRAM) as played:
+        played.wait_shown(b"BEGUN")
+        played.type(b"\x1b[200~w")
+        shown, deadline = b"", time.monotonic() + WITHIN_S
+        while b"EMERGENCY" not in shown:
+            assert time.monotonic() < deadline, shown
+            played.type(b"x")  # a hand presses again, because a busy machine may read paste and key at once
+            if select.select([played.terminal], [], [], 0.2)[0]:
+                shown += os.read(played.terminal, 1 << 16)
+        assert b"READ-BY" not in shown
+        played.type(b"q")
+        assert played.screen.wait(WITHIN_S) == 0
