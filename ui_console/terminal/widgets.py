@@ -26,6 +26,7 @@ from ui_console.terminal.video import fit, row_segments, shrink
 
 SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``
 ANSWERED_WITHIN_S = 1.0  # chosen: as for pictures, by which nobody must drive when they are older
+MOST_DRAWN = (160, 60)  # columns and rows; measured: a noisy picture of 320 x 120 keeps a key waiting for 1 to 2 s
 CURSOR = Style(reverse=True)
 OLD = Style(bold=True, color="white", bgcolor="red")
 
@@ -84,8 +85,9 @@ class Video(Widget):
         return Strip([send(self._shown, columns, rows), *cells], self.size.width) if y == 0 else cells
 
     def _cells(self, picture: NDArray[np.uint8]) -> tuple[int, int]:
-        most_rows = min(self.size.height, MOST_ROWS) if self._has_pixels else self.size.height
-        return fit(picture.shape[1], picture.shape[0], self.size.width, most_rows)
+        width, height = self.size
+        room = (width, MOST_ROWS) if self._has_pixels else MOST_DRAWN
+        return fit(picture.shape[1], picture.shape[0], min(width, room[0]), min(height, room[1]))
 
 
 class Panel(Static):

@@ -1,12 +1,16 @@
-"""A terminal that is made very small ends no console, whatever is on its screen."""
+"""A terminal that is very small ends no console, whatever is on its screen; one that is very large holds up no key."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from console_scenes import held_model
+from screen_text import screen_text
 from written_session import WrittenSession, settle
 
 from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.video import UPPER_HALF
+from ui_console.terminal.widgets import MOST_DRAWN
 
 
 @pytest.mark.parametrize("key", ["", "p", "O", "M", "slash", "question_mark", "c"])
@@ -22,3 +26,13 @@ async def test_a_terminal_of_one_character_and_back_ends_no_console(key: str) ->
         await pilot.press("X")
         await settle(pilot)
         assert "stop all" in session.wanted
+
+
+async def test_a_picture_takes_no_more_cells_on_a_wall_of_screens_than_a_key_may_wait_for() -> None:
+    session = WrittenSession(shown=held_model())
+    session.shown = np.tile(np.arange(240, dtype=np.uint8)[:, np.newaxis], (1, 320))
+    async with ConsoleApp(session).run_test(size=(500, 200)) as pilot:
+        await settle(pilot)
+        drawn = [line.count(UPPER_HALF) for line in screen_text(pilot.app).splitlines()]
+    assert max(drawn) == MOST_DRAWN[0]
+    assert sum(count > 0 for count in drawn) == MOST_DRAWN[1]
