@@ -95,20 +95,18 @@ class TerminalDriver(LinuxDriver):
                 if is_typed and not (typed := os.read(self.fileno, READ_MOST_BYTES)):
                     return  # the terminal was closed
                 now_s = time.monotonic()
-                self._gate.read(now_s)
                 if typed:
                     typed_s = now_s
-                    self._pass_on(stream.typed(decode(typed)))
-                elif now_s >= typed_s + TICK_S:
-                    self._pass_on(stream.pause())
+                    self._pass_on(stream.typed(decode(typed)), now_s)
+                else:
+                    self._pass_on(stream.pause() if now_s >= typed_s + TICK_S else (), now_s)
 
     def _draw_anew(self) -> None:
         with suppress(RuntimeError):  # the event loop has ended
             self._loop.call_soon_threadsafe(self._app.refresh)
 
-    def _pass_on(self, events: Iterable[Message]) -> None:
-        for event in events:
-            if self._gate.admits(event):
-                self.process_message(event)
+    def _pass_on(self, read: Iterable[Message], now_s: float) -> None:
+        for event in self._gate.admitted(read, now_s):
+            self.process_message(event)
         if self._gate.has_dropped:
             self.process_message(KeysDropped())

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from textual.events import AppFocus, CursorPosition, Key, MouseDown, Paste
+from textual.events import AppFocus, CursorPosition, Key, MouseDown, MouseMove, MouseUp, Paste
 from textual.message import Message
 
-from ui_console.terminal.key_gate import KEYS_PER_S, MOST_AT_ONCE, KeyGate
+from ui_console.terminal.key_gate import KEYS_PER_S, MOST_AT_ONCE, MOVES_PER_S, KeyGate
 from ui_console.terminal.key_stream import MOST_KEPT, KeyStream
 
 SENT = st.text(alphabet="\x1b[]OPM?<;:0129$~^_\\xXwqäu\x07 ", max_size=60)
@@ -109,24 +109,41 @@ def test_reports_are_understood_beside_keys() -> None:
 def test_a_hand_is_admitted_and_a_flood_is_not_but_its_stops_are() -> None:
     gate = KeyGate()
     gate.begin(0.0)
-    gate.read(0.1)
-    flood = [gate.admits(Key("w", "w")) for _ in range(1000)]
-    assert sum(flood) == MOST_AT_ONCE
+    admitted = gate.admitted([*[Key("w", "w")] * 1000, *[Key("X", "X")] * 3], 0.1)
+    assert keys(admitted) == [*["w"] * MOST_AT_ONCE, "X"]
     assert gate.has_dropped
-    assert [gate.admits(Key("X", "X")) for _ in range(3)] == [True, False, False]
     for number in range(1, 100):
-        gate.read(0.1 + number / 30)
-        assert gate.admits(Key("w", "w"))
+        assert keys(gate.admitted([Key("w", "w")], 0.1 + number / 30)) == ["w"]
         assert not gate.has_dropped
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 0.4), st.integers(0, 200)), max_size=20))
 def test_no_more_keys_are_admitted_than_a_hand_types(reads: list[tuple[float, int]]) -> None:
-    gate, now_s, admitted = KeyGate(), 0.0, 0
+    gate, now_s, typed = KeyGate(), 0.0, 0
     gate.begin(now_s)
-    for after_s, typed in reads:
+    for after_s, count in reads:
         now_s += after_s
-        gate.read(now_s)
-        admitted += sum(gate.admits(Key("w", "w")) for _ in range(typed))
-        assert gate.admits(Key("X", "X"))
-    assert admitted <= MOST_AT_ONCE + now_s * KEYS_PER_S + 1
+        admitted = keys(gate.admitted([*[Key("w", "w")] * count, Key("X", "X")], now_s))
+        assert admitted[-1] == "X"
+        typed += len(admitted) - 1
+    assert typed <= MOST_AT_ONCE + now_s * KEYS_PER_S + 1
+
+
+def test_of_a_flood_of_moves_the_last_one_arrives_and_no_more_than_a_hand_makes() -> None:
+    gate, stream, moves = KeyGate(), KeyStream(), []
+    gate.begin(0.0)
+    for number in range(1000):
+        read = stream.typed(f"\x1b[<35;{number + 1};5M")
+        moves += gate.admitted(read, number / 1000)
+    moves += gate.admitted([], 1.1)
+    assert MOVES_PER_S / 2 < len(moves) <= MOVES_PER_S + 2
+    assert isinstance(moves[-1], MouseMove)
+    assert moves[-1].x == 999
+
+
+def test_a_release_of_the_mouse_is_always_admitted_after_its_moves() -> None:
+    gate, stream = KeyGate(), KeyStream()
+    gate.begin(0.0)
+    typed = "\x1b[<0;5;5M" + "\x1b[<32;6;5M" * 500 + "\x1b[<0;7;5m"
+    assert [type(event) for event in gate.admitted(stream.typed(typed), 0.1)] == [MouseDown, MouseUp]
+    assert not gate.admitted([], 0.2)
