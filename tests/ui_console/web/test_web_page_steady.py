@@ -51,7 +51,28 @@ async def test_pad_and_buttons_stay_when_the_robot_is_granted_and_when_its_comma
         assert await centers(page, *HANDS) == held, "commands known"
 
 
-async def test_a_question_that_pushes_the_pad_down_turns_no_slow_finger_into_a_fast_one(stage: Stage) -> None:
+APPEARS = """() => {
+  for (const id of ["lost", "consent", "orders", "let-go"]) document.getElementById(id).hidden = false;
+  for (const id of ["taken", "lost-line", "consent-line", "asked", "own"])
+    document.getElementById(id).textContent = "anna asks for scout1, because hers has lost its radio link. ".repeat(3);
+}"""
+"""What news brings that the operator did not ask for."""
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_no_news_moves_a_control(stage: Stage, size: str) -> None:
+    async with page_at(stage, size) as page:
+        await take(page)
+        await page.evaluate("() => scrollTo(0, 0)")
+        names = [*HANDS, *([] if size == "phone" else ["thumbs", "tabs"])]
+        before = await centers(page, *names)
+        await page.evaluate(APPEARS)
+        assert await page.locator("#consent-yes").is_visible()
+        await page.evaluate("() => scrollTo(0, 0)")
+        assert await centers(page, *names) == before
+
+
+async def test_a_pad_that_moves_under_a_finger_turns_no_slow_finger_into_a_fast_one(stage: Stage) -> None:
     async with page_at(stage, "tablet") as page:
         await take(page)
         wheels = Wheels(stage)
@@ -63,7 +84,7 @@ async def test_a_question_that_pushes_the_pad_down_turns_no_slow_finger_into_a_f
         await wheels.wait_turning()
         slow = wheels.news[-1]
         assert isinstance(slow, Move)
-        await page.locator("#consent").evaluate("question => { question.hidden = false; }")
+        await page.locator("#news").evaluate("news => { news.style.height = '18rem'; }")
         assert (await page.locator("#pad").bounding_box())["y"] > box["y"] + box["height"] / 4, "it moved"
         await finger.move(x, y - 1)
         wheels.forget()
