@@ -136,8 +136,8 @@ class PageServer(Generic[ClientT, IntentT]):
         if self._is_over:
             return connection.respond(404, f"{NOT_SERVED}.\n")
         if path.partition("?")[0] != SOCKET_PATH:
-            return _response(self._files.answer(path, request.headers.get("If-None-Match", "")))
-        if not is_own_page(request.headers.get("Origin", ""), request.headers.get("Host", "")):
+            return _response(self._files.answer(path, _header(request, "If-None-Match")))
+        if not is_own_page(_header(request, "Origin"), _header(request, "Host")):
             remedy = "Close that page; only this server's own may connect."
             self._application.report_violation(
                 _who(connection), ProtocolViolation(ViolationKind.ORIGIN, "shows a page of another site", remedy)
@@ -366,6 +366,11 @@ def _was_oversized(closed: ConnectionClosed) -> bool:
 def _who(connection: ServerConnection) -> str:
     peer = connection.remote_address
     return str(peer[0]) if peer else "an unknown address"
+
+
+def _header(request: Request, name: str) -> str:
+    """Return a header; one that a client repeats is one list (RFC 9110, 5.2), which is no host and no origin."""
+    return ", ".join(request.headers.get_all(name))
 
 
 def _now_s() -> float:

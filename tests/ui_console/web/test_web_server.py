@@ -236,6 +236,18 @@ async def test_a_page_of_another_site_may_not_connect(stage: Stage) -> None:
             pass
 
 
+@pytest.mark.parametrize("header", ["Host", "Origin"])
+async def test_a_connection_that_repeats_its_host_or_origin_is_refused_as_another_site(
+    stage: Stage, header: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    own = f"http://127.0.0.1:{stage.port}"
+    repeated = [("Origin", own), (header, own if header == "Origin" else "evil.example")]
+    with pytest.raises(InvalidStatus, match="403"):
+        async with stage.connection(additional_headers=repeated):
+            pytest.fail("was let in")
+    assert "Traceback" not in capfd.readouterr().err
+
+
 async def test_others_do_not_notice_one_that_floods(stage: Stage) -> None:
     stage.grant_all()
     async with stage.browser() as anna, stage.connection() as flooder:
