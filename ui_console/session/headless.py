@@ -6,6 +6,7 @@ import asyncio
 import sys
 from pathlib import Path
 
+from backbone.command_line.unusable_file import unreadable
 from backbone.command_line.where import Where
 from backbone.component.component import NoParameters
 from backbone.launcher.endings import ExitCode, say
@@ -30,14 +31,16 @@ async def drive_by_script(where: Where, wished: dict[str, object], user: str, sc
         user: The driver, for the record.
         script: File of JSON lines; ``-``: standard input.
         within_s: Longest wait for the grant, mission seconds; 0: no limit.
+
+    Raises:
+        FileUnusable: The script cannot be read.
     """
     steps: list[Step] | None = None
     try:
         if script != STANDARD_INPUT:
             steps = read_script(await asyncio.to_thread(Path(script).read_text))
     except OSError as error:
-        say(f"{script} cannot be read: {error.strerror or error}")
-        return ExitCode.USAGE
+        raise unreadable(Path(script), error) from error
     except (UnicodeDecodeError, WrongScript) as error:
         say(f"{script}: {error}")
         return ExitCode.USAGE
