@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from known_arcs import lit_types
 from web_browser import Finger
-from web_page import ALL_SIZES, Wheels, card, page_at, take
+from web_page import ALL_SIZES, Wheels, card, page_at, stop_button, take
 from web_stage import Stage
 
 from backbone.component_database.messages import ComponentType
@@ -51,25 +51,43 @@ async def test_pad_and_buttons_stay_when_the_robot_is_granted_and_when_its_comma
         assert await centers(page, *HANDS) == held, "commands known"
 
 
-APPEARS = """() => {
-  for (const id of ["lost", "consent", "orders", "let-go"]) document.getElementById(id).hidden = false;
+PLACES = """names => {
+  const places = () => {
+    scrollTo(0, 0);
+    return names.map((name) => document.getElementById(name).getBoundingClientRect()).map((box) => [box.x, box.y]);
+  };
+  const before = places();
+  for (const id of ["lost", "consent", "orders", "let-go", "blind", "unsure"])
+    document.getElementById(id).hidden = false;
   for (const id of ["taken", "lost-line", "consent-line", "asked", "own"])
     document.getElementById(id).textContent = "anna asks for scout1, because hers has lost its radio link. ".repeat(3);
+  const line = document.createElement("span");
+  line.textContent = "alarm: launcher is absent: it is silent, so what is shown may be old. ".repeat(9);
+  document.getElementById("alarm-bar").replaceChildren(line);
+  return [before, places()];
 }"""
-"""What news brings that the operator did not ask for."""
+"""The places of controls before and after news that the operator did not ask for."""
 
 
 @pytest.mark.parametrize("size", ALL_SIZES)
 async def test_no_news_moves_a_control(stage: Stage, size: str) -> None:
     async with page_at(stage, size) as page:
         await take(page)
+        below = [] if size == "phone" else ["thumbs", "tabs"]
+        before, after = await page.evaluate(PLACES, [*HANDS, "stage", *below])
+        assert after == before
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_a_stop_that_is_not_certain_covers_no_button_that_stops(stage: Stage, size: str) -> None:
+    async with page_at(stage, size) as page:
         await page.evaluate("() => scrollTo(0, 0)")
-        names = [*HANDS, *([] if size == "phone" else ["thumbs", "tabs"])]
-        before = await centers(page, *names)
-        await page.evaluate(APPEARS)
-        assert await page.locator("#consent-yes").is_visible()
-        await page.evaluate("() => scrollTo(0, 0)")
-        assert await centers(page, *names) == before
+        await page.locator("#unsure").evaluate(
+            "line => { line.hidden = false; line.textContent = 'NOT CERTAIN to have stopped: scout1, scout2, scout3'; }"
+        )
+        for robot in ("scout1", "scout2"):
+            await stop_button(page, robot).click(trial=True)
+        await page.locator("#stop-all").click(trial=True)
 
 
 async def test_a_pad_that_moves_under_a_finger_turns_no_slow_finger_into_a_fast_one(stage: Stage) -> None:
