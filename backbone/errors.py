@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from traceback import walk_tb
 from types import FrameType
 from typing import ClassVar
@@ -47,7 +47,7 @@ class Refusal(BackboneError):
 
     def __init__(self, detail: str, *, remedy: str | None = None, **facts: Fact) -> None:
         super().__init__(detail)
-        self.detail = detail
+        self.detail = str(detail)  # a developer may pass the exception of a library
         self.facts: Mapping[str, Fact] = facts
         if remedy is not None:
             self.remedy = remedy
@@ -93,6 +93,20 @@ def code_of(refusal: Refusal) -> str:
     return str(refusal.facts.get("code", refusal.code)) if isinstance(refusal, UnknownRefusal) else refusal.code
 
 
+def named(error: BaseException) -> str:
+    """Return the class and the text of an exception; a class whose text fails is named all the same.
+
+    Example:
+        >>> named(ValueError("no picture")), named(SystemExit())
+        ('ValueError: no picture', 'SystemExit: ')
+    """
+    try:
+        told = str(error)
+    except Exception as failed:
+        told = f"its __str__ raised {type(failed).__name__}"
+    return f"{type(error).__name__}: {told}"
+
+
 def complaint(error: BaseException, most: int = MOST_CHARACTERS) -> str:
     """Return an exception as one printable line of bounded length, with its place in the code if it has one.
 
@@ -103,7 +117,7 @@ def complaint(error: BaseException, most: int = MOST_CHARACTERS) -> str:
         >>> complaint(ValueError("no picture"))
         'ValueError: no picture'
     """
-    told = printable(" ".join(f"{type(error).__name__}: {error}".split()), most)
+    told = printable(" ".join(named(error).split()), most)
     frames = list(walk_tb(error.__traceback__))
     inmost = f"{frames[-1][0].f_code.co_filename}, line {frames[-1][1]}" if frames else ""
     place = own_place(error) or printable(inmost)
@@ -117,9 +131,24 @@ def own_place(error: BaseException) -> str:
     """
     if isinstance(error, SyntaxError) and error.filename is not None:
         return printable(f"{error.filename}, line {error.lineno}")
-    places = [
-        (_package(frame), f"{frame.f_code.co_filename}, line {line}") for frame, line in walk_tb(error.__traceback__)
-    ]
+    return _own_place(walk_tb(error.__traceback__))
+
+
+def waiting_place(coroutine: object) -> str:
+    """Return the file and line of a developer at which a coroutine waits; empty: it waits in no such file.
+
+    A coroutine that waits for another task has the place of its own ``await``.
+    """
+    frames: list[tuple[FrameType, int]] = []
+    while inspect.iscoroutine(coroutine):
+        if coroutine.cr_frame is not None:
+            frames.append((coroutine.cr_frame, coroutine.cr_frame.f_lineno))
+        coroutine = coroutine.cr_await
+    return _own_place(frames)
+
+
+def _own_place(frames: Iterable[tuple[FrameType, int]]) -> str:
+    places = [(_package(frame), f"{frame.f_code.co_filename}, line {line}") for frame, line in frames]
     own = next((package for package, _ in places if package not in _NOT_A_DEVELOPERS), "")
     return printable(next((place for package, place in reversed(places) if package == own), ""))
 

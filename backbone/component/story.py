@@ -8,6 +8,7 @@ from functools import lru_cache
 
 from backbone.bus.interface import Clock, current_cause
 from backbone.component.messages import LogLevel, StoryEvent
+from backbone.errors import named
 from backbone.naming import component_of
 from backbone.printable import printable_all
 from backbone.printable_text import printable
@@ -70,4 +71,4 @@ def _spoken_of(name: str) -> re.Pattern[str]:
 
 def feedback_of(bug: BaseException) -> str:
     """Return a bug as one printable line of a component's feedback; any program can write its text."""
-    return printable(" ".join(f"{type(bug).__name__}: {bug}".split())[:MAX_FEEDBACK_LENGTH])
+    return printable(" ".join(named(bug).split())[:MAX_FEEDBACK_LENGTH])

@@ -65,6 +65,23 @@ def test_an_unknown_code_stays_readable_and_travels_on_under_its_own_code() -> N
     assert (again.code, again.detail, again.remedy) == ("elsewhere.defined", "no", "ask there")
 
 
+def test_a_refusal_made_of_an_exception_travels_with_its_text() -> None:
+    """``raise HardwareFault(error)`` in a driver: encoding it failed in the bus, without the driver's place."""
+    error: Any = OSError("no cable")
+    back = Refused.of(TooHeavy(error)).revive()
+    assert (back.detail, str(back)) == ("no cable", "no cable (Carry less.)")
+
+
+def test_an_exception_whose_text_fails_is_named_all_the_same() -> None:
+    """The task that it ended did not count as failed, and its component stood still without a word."""
+
+    class Ugly(Exception):
+        def __str__(self) -> str:
+            raise LookupError
+
+    assert complaint(Ugly()) == "Ugly: its __str__ raised LookupError"
+
+
 @given(st.sampled_from(["refused", "test.heavy", "test.counted", "elsewhere"]) | text, text, text, facts)
 def test_no_content_makes_reviving_fail(code: str, detail: str, remedy: str, told: dict[str, Any]) -> None:
     """Facts named like the constructor's arguments ("detail", "remedy", "self") included."""
