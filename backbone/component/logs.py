@@ -35,6 +35,7 @@ FOLDER_BYTES = 64 << 20  # chosen: a mission of 30 components with two full file
 TIDY_EVERY_S = 10.0  # chosen: a mission of 400 components starts in less, and tidies once
 _TIDIED = ".tidied"
 _OLD = ".1"
+_NO_STREAM = (OSError, ValueError, AttributeError)  # a full disk, or a stream that was closed or replaced by None
 
 
 def log_path(run_directory: str, name: str) -> Path:
@@ -121,7 +122,7 @@ class ComponentLog(logging.Handler):
         line = printable_lines(text, LINE_BYTES).encode()
         if len(line) > LINE_BYTES:
             line = line[:LINE_BYTES] + f"... ({len(line)} bytes)".encode()
-        with contextlib.suppress(OSError, ValueError):  # a full disk, or a stream that was closed
+        with contextlib.suppress(*_NO_STREAM):
             sys.stderr.flush()
         with contextlib.suppress(OSError):  # a full disk: the line is lost
             write_all(self._output, line + b"\n")
@@ -229,7 +230,7 @@ def _is_same(one: int, other: int) -> bool:
 
 def _turn_output_to(descriptor: int, *outputs: int) -> None:
     """Redirect these descriptors to the descriptor, and close it."""
-    with contextlib.suppress(OSError, ValueError):  # a full disk, or a stream that was closed
+    with contextlib.suppress(*_NO_STREAM):
         sys.stdout.flush()
         sys.stderr.flush()
     for output in outputs:

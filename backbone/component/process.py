@@ -29,7 +29,7 @@ from backbone.waiting import end_tasks
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
 _REFUSED = "process %d: %s ended, refused [%s]: %s (remedy: %s)"
 MOST_CAUSE = 300  # chosen: exception and a sentence; it is shown in one line beside other facts
-_CAUSE_LINE = re.compile(r" process (\d+): (\S+) ended(?: by a bug:|, refused \[\S+\]:|: \w+:) (.*)$")
+_CAUSE_LINE = re.compile(r"(?:^|[ :])process (\d+): (\S+) ended(?: by a bug:|, refused \[\S+\]:|: \w+:) (.*)$")
 _REFUSED_LINE = re.compile(r" (\S+) ended, refused \[([^]]+)\]: (.*) \(remedy: (.*)\)$")
 
 
@@ -68,8 +68,11 @@ def run_to_end(launch: Launch, begin: Callable[[], Coroutine[object, None, None]
 
 
 def exit_code_of(error: BaseException, address: str) -> int:
-    """Log why a component ended and return the matching exit code."""
+    """Log why a component ended, even if its code has switched logging off, and return the matching exit code."""
     log, pid = logging.getLogger(__name__), os.getpid()
+    logging.disable(logging.NOTSET)
+    log.disabled = False  # as ``logging.config`` leaves the loggers that it does not name
+    log.setLevel(logging.ERROR)
     match error:
         case Refusal():
             place = own_place(error)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+from collections.abc import Callable
 
 import msgspec
 import pytest
@@ -18,7 +19,7 @@ from backbone.component.messages import (
     SetParameter,
 )
 from backbone.component.own_tasks import TASKS_END_WITHIN_S
-from backbone.component.process import EXIT_REFUSED, cause_in_log, exit_code_of, refusal_in_log
+from backbone.component.process import EXIT_BUG, EXIT_REFUSED, cause_in_log, exit_code_of, refusal_in_log
 from backbone.component.story import MAX_FEEDBACK_LENGTH
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
@@ -198,6 +199,51 @@ def test_a_cancellation_that_nobody_asked_for_is_a_bug_and_one_that_somebody_ask
         assert stage.states[-1].state is LifeState.FAILED
 
     live(law())
+
+
+def test_a_bug_whose_text_fails_ends_it_too() -> None:
+    class Ugly(Exception):
+        def __str__(self) -> str:
+            raise LookupError
+
+    async def fall() -> None:
+        raise Ugly
+
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        stage.walker.start_task(fall(), "fall")
+        with pytest.raises(Ugly):
+            await life
+        assert stage.states[-1].feedback == "Ugly: its __str__ raised LookupError"
+
+    live(law())
+
+
+@pytest.mark.parametrize(
+    "silence",
+    [
+        logging.disable,
+        lambda: setattr(logging.getLogger("backbone.component.process"), "disabled", True),
+        lambda: logging.getLogger("backbone.component.process").setLevel(logging.CRITICAL + 1),
+    ],
+    ids=["all logging", "its logger", "its level"],
+)
+def test_a_component_that_switched_logging_off_says_why_it_ends(
+    silence: Callable[[], None], caplog: pytest.LogCaptureFixture
+) -> None:
+    """As ``logging.config.dictConfig`` does by default with all loggers that exist."""
+    silence()
+    code = exit_code_of(ValueError("boom"), "mission_control/unit")
+    assert code == EXIT_BUG
+    assert cause_in_log([f"12:00 ERROR x: {line}" for line in caplog.messages], "mission_control/unit", os.getpid())
+
+
+def test_the_cause_is_found_in_a_log_of_another_format() -> None:
+    """``logging.basicConfig(force=True)`` in a module replaces the format."""
+    for before in ("", "ERROR:backbone.component.process:"):
+        line = f"{before}process 7: rc/x ended by a bug: ValueError: boom"
+        assert cause_in_log([line], "rc/x", 7) == "ValueError: boom"
 
 
 def test_the_first_of_two_bugs_is_the_one_raised() -> None:

@@ -126,6 +126,13 @@ def test_lines_of_strangers_are_cut_and_move_no_cursor(tmp_path: Path) -> None:
 
 
 @pytest.mark.processes
+def test_a_process_that_replaced_its_streams_by_none_logs_on(tmp_path: Path) -> None:
+    logs = log_folder(tmp_path)
+    assert run(tmp_path, "sys.stdout = sys.stderr = None; log.error('still here'); kept.look_after()") == 0
+    assert "still here" in (logs / "scout1.log").read_text()
+
+
+@pytest.mark.processes
 def test_the_time_of_what_was_counted_is_told(tmp_path: Path) -> None:
     logs = log_folder(tmp_path)
     assert run(tmp_path, "for _ in range(513): log.warning('late')\nkept.close()") == 0
