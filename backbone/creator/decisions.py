@@ -112,16 +112,21 @@ Instruction = (
 )
 
 
+CRASHES = frozenset({signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL})
+"""Signals that a process gets because of its own code."""
+
+
 def describe(returncode: int, cause: str = "") -> str:
     """Return how a process ended, for people.
 
     Example:
-        >>> describe(1, "ValueError: no picture"), describe(-9)
-        ('exit code 1: ValueError: no picture', 'killed by SIGKILL')
+        >>> describe(1, "ValueError: no picture"), describe(-9), describe(-11, "pan.py, line 7, in update")
+        ('exit code 1: ValueError: no picture', 'killed by SIGKILL', 'killed by SIGSEGV: pan.py, line 7, in update')
     """
     if returncode >= 0:
         return f"exit code {returncode}{cause and ': '}{cause}"
     try:
-        return f"killed by {signal.Signals(-returncode).name}"
+        killed = f"killed by {signal.Signals(-returncode).name}"
     except ValueError:
         return f"killed by signal {-returncode}"
+    return f"{killed}: {cause}" if cause and -returncode in CRASHES else killed

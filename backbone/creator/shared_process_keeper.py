@@ -172,7 +172,7 @@ class SharedProcessKeeper:
         ended = await ask_until_answered(
             bus, self._clock, at, AwaitEnd(life), MemberEnded, each_s=AWAIT_EACH_S, within_s=math.inf
         )
-        cause = cause_of_end(launch, pid, ended.exit_code)
+        cause = cause_of_end(launch, pid, ended.exit_code) if ended.exit_code else ""
         self._carry_out(self._shared.member_ended(life, ended.exit_code, self._now_s(), cause))
 
     async def _end_member(self, bus: Bus, at: str, life: int) -> None:
