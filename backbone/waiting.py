@@ -62,6 +62,12 @@ def bug_of(task: asyncio.Task[Any]) -> BaseException | None:
     )
 
 
+def is_cancelled() -> bool:
+    """Return whether a caller has cancelled the present task; otherwise a ``CancelledError`` in it is a bug."""
+    task = asyncio.current_task()
+    return task is None or task.cancelling() > 0
+
+
 async def only_bugs(work: Awaitable[T], name: str = "") -> T:
     """Return the result of the work; raise its exceptions as an ``Exception``, except those in ``PASSING``.
 
@@ -76,23 +82,25 @@ async def only_bugs(work: Awaitable[T], name: str = "") -> T:
         return await work
     except asyncio.CancelledError as cut:
         task = asyncio.current_task()
-        if task is None or task.cancelling():
+        if task is None or is_cancelled():
             raise
-        raise RuntimeError(f"{name or task.get_name()} raised CancelledError, and no caller cancelled it") from cut
+        raise RuntimeError(f"{name or task.get_name()} raised {complaint(cut)}, and no caller cancelled it") from cut
     except PASSING:
         raise
     except BaseException as error:
         raise as_bug(error) from error
 
 
-def as_bug(error: BaseException) -> Exception:
-    """Return the exception, which a caller of ``Exception`` can handle.
+def as_bug(error: object) -> Exception:
+    """Return the exception, which a caller of ``Exception`` can handle; anything else becomes the text of one.
 
     Example:
-        >>> as_bug(KeyError("no")), as_bug(SystemExit(3))
-        (KeyError('no'), RuntimeError('SystemExit: 3'))
+        >>> as_bug(KeyError("no")), as_bug(SystemExit(3)), as_bug("no cable")
+        (KeyError('no'), RuntimeError('SystemExit: 3'), RuntimeError("'no cable' in place of an exception"))
     """
-    return error if isinstance(error, Exception) else RuntimeError(complaint(error))
+    if isinstance(error, BaseException):
+        return error if isinstance(error, Exception) else RuntimeError(complaint(error))
+    return RuntimeError(f"{error!r} in place of an exception")
 
 
 def settle(future: asyncio.Future[Any], outcome: object) -> None:

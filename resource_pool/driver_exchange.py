@@ -38,7 +38,7 @@ from backbone.exchange_course import (
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
 from backbone.reading_anew import WrongClass, read_anew
-from backbone.waiting import only_bugs, set_within
+from backbone.waiting import as_bug, only_bugs, set_within
 from resource_pool.driver_slot import DriverSlot
 from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions, driver_class, driver_path, methods_of
 from resource_pool.orders_in_progress import CUT_WITHIN_S
@@ -101,7 +101,11 @@ class DriverExchanges:
     def made(self, build: Callable[[DriverSite], object], site: DriverSite) -> object:
         """Return a driver whose spontaneous failures count as failures of this driver."""
         mine: list[object] = []
-        driver = build(dataclasses.replace(site, fail=lambda bug: self._driver_failed(mine[0] if mine else None, bug)))
+
+        def failed(bug: object) -> None:
+            self._driver_failed(mine[0] if mine else None, as_bug(bug))
+
+        driver = build(dataclasses.replace(site, fail=failed))
         mine.append(driver)
         return driver
 

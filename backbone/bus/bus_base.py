@@ -9,11 +9,11 @@ from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
 
 from backbone.bus.interface import Answer, BusStatistics, Clock, Copies, Listener, Told, current_cause
-from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
+from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal, complaint
 from backbone.keys import Conversation
 from backbone.quality import QUALITY, Quality
 from backbone.ranges import MOST_FEW, MOST_QUOTED_BYTES
-from backbone.waiting import PASSING, as_bug, settle
+from backbone.waiting import PASSING, as_bug, is_cancelled, settle
 from backbone.wire import WIRE_VERSION, Envelope, Message, OversizedMessage, Refused, UnwritableMessage, write
 
 log = logging.getLogger(__name__)
@@ -108,6 +108,11 @@ class BusBase(ABC):
         except Refusal as refusal:
             self.refused += 1
             body = Refused.of(refusal)
+        except asyncio.CancelledError as cut:
+            if is_cancelled():
+                raise
+            self.on_bug(RuntimeError(f"an answer of {self.source} raised {complaint(cut)}, and no caller cancelled it"))
+            return None
         except PASSING:
             raise
         except BaseException as bug:

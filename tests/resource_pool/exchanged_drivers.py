@@ -81,6 +81,8 @@ class Second(First):
                 await asyncio.Event().wait()
             case "task":
                 self.site.fail(OSError("pulled"))
+            case "text":
+                self.site.fail("pulled")  # type: ignore[arg-type]
         await super().set_brightness(share)
 
 

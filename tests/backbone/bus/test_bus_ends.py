@@ -72,6 +72,26 @@ def test_a_bug_in_a_listener_goes_to_on_bug_and_does_not_stop_the_others(on_bus:
     on_bus(law)
 
 
+def test_a_cancellation_in_an_answer_that_no_caller_asked_for_is_a_bug_with_its_place(on_bus: Runner) -> None:
+    """``prepare`` of an ARC that took the result of a cancelled task: only "no component answered" was told."""
+
+    async def law(net: Net) -> None:
+        bugs = Heard()
+
+        async def answer(_asked: Envelope[Any]) -> Message:
+            raise asyncio.CancelledError
+
+        async with pair(net, answer) as (asker, server):
+            server.on_bug = bugs
+            with pytest.raises(NoResponder):
+                await asker.ask(SERVER, Echo(), Echoed, within_s=ASK_S)
+            await bugs.until_count(1)
+            line = answer.__code__.co_firstlineno + 1
+            assert f"an answer of {SERVER} raised CancelledError: ({__file__}, line {line})" in str(bugs.all[0])
+
+    on_bus(law)
+
+
 def test_a_listener_that_takes_the_result_of_a_cancelled_task_has_a_bug_like_others(on_bus: Runner) -> None:
     async def law(net: Net) -> None:
         source, listener, work = net.join(SERVER), net.join(ASKER), asyncio.get_running_loop().create_future()
