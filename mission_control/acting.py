@@ -47,6 +47,8 @@ class Acting:
     def begin(self, arc: ArcClient) -> None:
         """Start ``act`` under the grant of this ARC."""
         self._task = self._actor.begin_task(self._act(arc), "act")
+        if self._task is not None:
+            self._task.add_done_callback(self._note_cancellation)
 
     async def stop(self) -> None:
         """Cancel the task and wait until it has ended; if it goes on, that is told with the place of ``act``."""
@@ -56,8 +58,7 @@ class Acting:
         task.cancel()
         _ended, goes_on = await asyncio.wait({task}, timeout=CANCELLED_WITHIN_S)
         if goes_on:
-            act = inspect.unwrap(type(self._hooks).act).__code__
-            told = f"act goes on after its cancellation ({act.co_filename}, line {act.co_firstlineno})"
+            told = f"act goes on after its cancellation ({self._place()})"
             self._actor.publish_event(self._actor.name, told, LogLevel.WARNING)
             await asyncio.wait({task})
 
@@ -83,6 +84,15 @@ class Acting:
                 await self._wait_until_it_may_move(arc, stopped)
                 continue
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+
+    def _note_cancellation(self, task: asyncio.Task[None]) -> None:
+        """Count as a bug that ``act`` has cancelled its own task: the behavior would keep its RCs without a word."""
+        if task.cancelled() and task is self._task:
+            self._actor.begin_task(_fail(f"act was cancelled by its own code ({self._place()})"), "act")
+
+    def _place(self) -> str:
+        act = inspect.unwrap(type(self._hooks).act).__code__
+        return f"{act.co_filename}, line {act.co_firstlineno}"
 
     def _note_return(self) -> None:
         """Report an ``act`` after which only the end of the grant takes the robot away; once in its story.
@@ -110,6 +120,10 @@ class Acting:
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
         else:
             self._actor.report(held)
+
+
+async def _fail(told: str) -> None:
+    raise RuntimeError(told)
 
 
 def cancel(task: asyncio.Task[None] | None) -> None:

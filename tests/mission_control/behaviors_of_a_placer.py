@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -94,6 +95,16 @@ class Stubborn(Driver):
             await self.clock.sleep_s(0.5)
 
 
+class Canceller(Behavior[Any]):
+    """Cancels its own task."""
+
+    async def act(self) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        task.cancel()
+        await self.clock.sleep_s(0.1)
+
+
 class Forgetful(Behavior[Any]):
     """Returns without ``finish``."""
 
@@ -127,6 +138,7 @@ CLASSES: dict[str, type[Component[Any]]] = {
     "driver": Driver,
     "starter": Starter,
     "stubborn": Stubborn,
+    "canceller": Canceller,
     "forgetful": Forgetful,
     "seer": Seer,
     "finisher": Finisher,

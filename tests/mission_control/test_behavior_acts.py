@@ -6,9 +6,10 @@ import re
 from typing import Any
 
 import pytest
-from behaviors_of_a_placer import ARC, Stubborn, node, root
+from behaviors_of_a_placer import ARC, Canceller, Stubborn, node, root
 from fake_resource_pool import FakePlacer, Run
 
+from backbone.component.messages import LifeState
 from backbone.errors import BackboneError, ReplyTimeout
 from backbone.keys import Conversation
 from resource_pool.arc_client import EmergencyStopped, StaleEpoch, StopState
@@ -191,6 +192,21 @@ def test_an_act_that_goes_on_after_its_cancellation_is_told_with_its_place(
         place = f"({Stubborn.act.__code__.co_filename}, line {Stubborn.act.__code__.co_firstlineno})"
         told = [event.what for event in own.story.of("own") if "cancellation" in event.what]
         assert told == [f"act goes on after its cancellation {place}"] * times
+
+    placer_world(scene)
+
+
+def test_an_act_that_cancels_itself_is_a_bug_with_its_place(placer_world: Run) -> None:
+    """Otherwise the behavior keeps its robot, and neither log nor status has a reason."""
+
+    async def scene(placer: FakePlacer) -> None:
+        own = await root(placer, node("own", "canceller", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        await placer.arcs["own-capture"].grant()
+        await placer.wait(lambda: own.state is LifeState.FAILED)
+        code = Canceller.act.__code__
+        place = f"({code.co_filename}, line {code.co_firstlineno})"
+        assert own.feedback == f"RuntimeError: act was cancelled by its own code {place}"
 
     placer_world(scene)
 
