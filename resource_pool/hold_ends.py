@@ -16,7 +16,7 @@ from typing import Protocol, TypeVar
 
 from backbone.component.component_of_parts import ComponentOfParts
 from backbone.component.messages import LogLevel
-from backbone.errors import LinkError, Refusal, complaint
+from backbone.errors import LinkError, Refusal, complaint, waiting_place
 from backbone.waiting import only_bugs
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.holds import Hold, HoldTable
@@ -26,6 +26,7 @@ log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 SAFE_WITHIN_S = 0.4  # chosen: below the RC manager's limit, so that the RC manager gets the reason; machine seconds
+ANSWERS_WITHIN_S = 0.8  # chosen: for so long an ARC waits for the answer to a command; machine seconds
 FAULTS = (Refusal, LinkError, TimeoutError)
 """Of a hook of a hold: the hardware, or a component that the hook asked, does not obey. All others are bugs."""
 
@@ -54,6 +55,8 @@ class HoldEnds:
         self._rc = rc
         self._unsafe: dict[str, Hold] = {}
         self._remark = ""
+        self._late: dict[asyncio.Task[object], str] = {}
+        self._told_late: tuple[str, int] | None = None
 
     def left(self) -> list[Hold]:
         """Return the ended holds after which the resource is still unsafe."""
@@ -70,9 +73,15 @@ class HoldEnds:
             StaleEpoch: The hold ended first; the work was cancelled.
             HardwareFault: The work went on nevertheless, and the resource is not safe after it.
         """
+        task = asyncio.current_task()
+        assert task is not None  # noqa: S101  a coroutine runs in a task
+        late = asyncio.get_running_loop().call_later(ANSWERS_WITHIN_S, self._note_late, hold, task)
         try:
             return await self.orders.run(hold, work)
         finally:
+            late.cancel()
+            if self._late.pop(task, None) is not None:
+                self.report_holders()
             if self.orders.went_on():
                 async with self.changing:
                     if self._unsafe.get(hold.arc) is hold:
@@ -137,11 +146,22 @@ class HoldEnds:
             self._remark = line
             self.report_holders()
 
+    def _note_late(self, hold: Hold, task: asyncio.Task[object]) -> None:
+        """Report a command that goes on; once for each hold in the log."""
+        place = waiting_place(task.get_coro())
+        told = f"a command has not ended within {ANSWERS_WITHIN_S} s{place and f' ({place})'}"
+        self._late[task] = told
+        if self._told_late != (hold.arc, hold.epoch):
+            self._told_late = hold.arc, hold.epoch
+            self._rc.publish_event(self._rc.name, f"{told}; its ARC {hold.arc} got no answer", LogLevel.WARNING)
+        self.report_holders()
+
     def report_holders(self) -> None:
-        """Report the ARCs that hold the RC, and the ARCs whose holds did not end safely."""
+        """Report the ARCs that hold the RC, those whose holds did not end safely, and a command that goes on."""
         holders = ", ".join(hold.arc for hold in self._rc.holds.holds())
         unsafe = f", not safe after {', '.join(self._unsafe)}" if self._unsafe else ""
-        remark = f"; {self._remark}" if self._remark else ""
+        remarks = [self._remark, *list(self._late.values())[:1]]
+        remark = "".join(f"; {line}" for line in remarks if line)
         self._rc.report(f"held by {holders}{unsafe}{remark}" if holders else f"free{unsafe}{remark}")
         self._rc.changed()  # the same ARC may hold the RC with a new epoch
 

@@ -18,6 +18,7 @@ from backbone.scheduling.requests import RcUse
 from backbone.wire import Message
 from resource_pool.commands import Command
 from resource_pool.drivers.interface import HardwareFault
+from resource_pool.hold_ends import ANSWERS_WITHIN_S
 from resource_pool.holds import Hold
 from resource_pool.messages import Applied
 from resource_pool.rcs.skeleton import Lamp, Shine
@@ -269,6 +270,38 @@ def test_a_command_in_progress_does_not_follow_the_safe_state(local_mission: Any
 def _lit(lamp: Lamp) -> list[str]:
     """Return what the lamp's driver has told of."""
     return [event.what for event in lamp.story.of("lights") if event.what.startswith(("shines", "is dark"))]
+
+
+class StuckLamp(Lamp):
+    """Waits for a device that does not answer."""
+
+    async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
+        await asyncio.Event().wait()
+        return await super().obey(hold, order)
+
+
+def test_a_command_that_does_not_end_is_told_with_its_place(local_mission: Any) -> None:
+    """A driver that hung: health was ok, and neither status nor log had a word of it."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            lamp = await pool.start(StuckLamp, "lights", {"driver": "resource_pool.rcs.skeleton:PaintedLamp"})
+            await _connect(pool, "one")
+            for _ in range(2):
+                shine = Shine(1.0).under("one", 1)
+                with pytest.raises(ReplyTimeout):
+                    await pool.voice("one").ask("resource_pool/lights", shine, Applied, within_s=ANSWERS_WITHIN_S)
+                await pool.clock.sleep_s(0.1)
+                lamp.holds.renew("one", 1, pool.clock.now_s() + LEASE_S)
+            place = f"{__file__}, line {StuckLamp.obey.__code__.co_firstlineno + 1}"
+            told = f"a command has not ended within 0.8 s ({place})"
+            assert lamp.feedback == f"held by one; {told}"
+            said = [(event.what, event.level) for event in lamp.story.of("lights") if "not ended" in event.what]
+            assert said == [(f"{told}; its ARC one got no answer", LogLevel.WARNING)], "once"
+            await _order(pool, Disconnect("one", 1), Disconnected)
+            assert lamp.feedback == "free"
+
+    run_virtual(main())
 
 
 def test_a_command_that_goes_on_after_its_cancellation_is_followed_by_the_safe_state(local_mission: Any) -> None:
