@@ -147,7 +147,9 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
         raise WrongPlanner(f"{rules.planner}: {hangs}", remedy=MEND) from hangs
     except BackboneError:
         raise
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a SystemExit would end the command without a word
         raise WrongPlanner(f"{rules.planner}: {complaint(error)}", remedy=MEND) from error
 
 

@@ -228,6 +228,8 @@ class WholeGroupPlanner:
         arcs = [*arcs]
         order = self.order(arcs)
         queued = {arc for arc in arcs if arc.queued}
+        if not isinstance(order, list):
+            raise TypeError(f"{type(self).__name__}.order returned {order!r}, not the list of the queued ARCs")
         if len(order) != len(queued) or {*order} != queued:
             told = ", ".join(arc.name for arc in order) or "nothing"
             raise AssertionError(f"the planner's order is {told}, not each queued ARC once")

@@ -54,6 +54,27 @@ def test_a_planner_that_fails_at_work_is_refused_by_the_dry_run(
     assert "planner_with_a_bug.py, line 3" in told
 
 
+@pytest.mark.parametrize(
+    ("name", "method", "said"),
+    [
+        ("planner_of_nothing", "def order(self, arcs): return None", "Own.order returned None, not the list"),
+        ("planner_that_exits", "def order(self, arcs): raise SystemExit(1)", "SystemExit: 1 ("),
+    ],
+)
+def test_a_planner_that_returns_nothing_or_exits_is_named_by_the_dry_run(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    method: str,
+    said: str,
+) -> None:
+    mission = read_mission(file_of(tmp_path, monkeypatch, name, method))
+    assert print_dry_run(mission, None, None, None) is ExitCode.MISSION_INVALID
+    assert f"{name}:Own: " in (told := capsys.readouterr().err)
+    assert said in told
+
+
 def test_a_planner_that_finds_its_own_fault_is_refused_by_the_dry_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
