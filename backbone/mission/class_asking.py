@@ -7,6 +7,7 @@ asking process no memory, and a module that raises, hangs, or ends its process d
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -15,8 +16,11 @@ import msgspec
 
 from backbone.mission.arranged import Arranged, UnitFault, UnitsQuestion
 from backbone.mission.class_facts import ClassFacts, Question
+from backbone.printable_text import printable
 
 WITHIN_S = 30.0  # chosen: ten times the import of OpenCV and MuJoCo on a loaded machine
+STACKS_AFTER = 0.8  # chosen: share of this time after which the other process writes where it stands
+_CALL = re.compile(r'  File "(.*)", line (\d+) in ')
 
 _known: dict[str, ClassFacts] = {}
 _judged: dict[str, str] = {}
@@ -86,7 +90,7 @@ def _facts(line: bytes) -> ClassFacts:
 
 def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
     """Return the lines that the other process printed, one for each question, and why there are not more."""
-    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what]
+    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what, f"{WITHIN_S * STACKS_AFTER}"]
     questions = "\0".join(about).encode()  # no arguments, whose length is limited
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     reason = "the process that imports its module ends without an answer"
@@ -95,5 +99,13 @@ def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
             command, env=environment, input=questions, capture_output=True, timeout=WITHIN_S, check=False
         ).stdout
     except subprocess.TimeoutExpired as expired:
-        printed, reason = expired.stdout or b"", f"its module is not imported within {WITHIN_S:g} s"
+        printed, place = expired.stdout or b"", _place(expired.stderr or b"")
+        reason = f"its module is not imported within {WITHIN_S:g} s{place and '; it is at '}{place}"
     return printed[: printed.rfind(b"\n") + 1].splitlines(), reason
+
+
+def _place(stacks: bytes) -> str:
+    """Return the innermost call of the main thread, whose stack the interpreter writes last; empty: there is none."""
+    _others, _begins, last = stacks.decode(errors="replace").rpartition("(most recent call first):\n")
+    found = _CALL.match(last)
+    return "" if found is None else printable(f"{found[1]}, line {found[2]}")

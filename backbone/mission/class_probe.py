@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import importlib
 import inspect
 import os
@@ -38,7 +39,7 @@ def facts_of(asked: str) -> ClassFacts:
     module, _, name = class_path.partition(":")
     try:
         found = getattr(importlib.import_module(module), name)
-    except Exception as error:  # a module that is being written raises anything
+    except BaseException as error:  # a module that is being written raises anything, or ends as a program does
         return ClassFacts(failure=f"its module cannot be imported: {_told(error)}")
     if not (isinstance(found, type) and issubclass(found, Component)):
         return ClassFacts(failure="it is no component: it does not derive from backbone.component.component:Component")
@@ -79,7 +80,7 @@ def _limits_faults(limits: Mapping[str, tuple[float, float]], abilities: Abiliti
     return "; ".join(of_nothing + empty)
 
 
-def _told(error: Exception) -> str:
+def _told(error: BaseException) -> str:
     return complaint(error if own_place(error) else error.with_traceback(None))  # no place in our own code
 
 
@@ -175,5 +176,6 @@ def _answer(what: str, about: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
+    faulthandler.dump_traceback_later(float(sys.argv[2]))  # so that a class that hangs is told with its place
     _answer(sys.argv[1], sys.stdin.buffer.read().decode().split("\0"))
     os._exit(0)  # a thread that a module started at its import may never end

@@ -88,7 +88,7 @@ def test_a_class_of_ones_own_is_asked_for_its_parameters(modules: Path) -> None:
         ("import json\njson.loads('no')\nclass Own: ...", "Expecting value: line 1 column 1 (char 0) ({file}, line 2)"),
         ("class Own:\n  def act(self:\n    ...", " ({file}, line 2)"),
         ("print('Own')\nimport os\nos._exit(3)", "the process that imports its module ends without an answer"),
-        ("import sys\nsys.exit('Own')", "the process that imports its module ends without an answer"),
+        ("import sys\nsys.exit('Own')", "its module cannot be imported: SystemExit: Own ({file}, line 2)"),
         (GOOD.replace("float = 1.0", "type | set[complex] = int"), "cannot be listed: parameter depth_m: TypeError"),
         (GOOD.replace("Own(Component):", "Own(Component):\n    driver_options = 5"), "cannot be listed: TypeError"),
     ],
@@ -207,7 +207,8 @@ def test_a_module_that_hangs_is_a_fault_and_holds_up_nothing_else(
     (modules / "own_hanging.py").write_text("import time\ntime.sleep(60)\nclass Own: ...")
     (modules / "own_after.py").write_text(GOOD)
     found = ask_classes(["own_hanging:Own", "own_after:Own"])
-    assert "not imported within 5 s" in found["own_hanging:Own"].failure
+    place = f"{modules / 'own_hanging.py'}, line 2"
+    assert f"not imported within 5 s; it is at {place}" in found["own_hanging:Own"].failure
     assert [one.name for one in found["own_after:Own"].parameters] == ["depth_m"]
 
 
