@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
+from backbone.errors import named
 from backbone.printable_text import printable
 from ui_console.model.message_views import LONGEST_TEXT, FieldRow, MessageView, PixelPicture, Views, field_rows
 from ui_console.model.series import SPAN_S, Series
@@ -66,8 +67,8 @@ class KeyView:
             try:
                 rows = msgspec.convert(msgspec.to_builtins(self._view.rows(body)), list[FieldRow])
                 return rows, msgspec.convert(self._view.picture(body), PixelPicture | None)
-            except Exception as error:  # a view of another package raises anything
-                why = f"{type(self._view).__name__} cannot show it: {type(error).__name__} {error}"
+            except (Exception, SystemExit) as error:  # a view of another package raises anything
+                why = f"{type(self._view).__name__} cannot show it: {named(error)}"
                 self.trouble = printable(why, LONGEST_TEXT)
         return field_rows(body), None
 

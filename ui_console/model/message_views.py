@@ -104,19 +104,27 @@ VIEWS: Views = {"Frame/1": PictureView, "ViewPicture/1": PictureView}
 
 @cache
 def installed_views() -> Views:
-    """Return the views of the installed packages, by schema; a package whose views cannot be loaded is left out."""
+    """Return the views of the installed packages, by schema; a package whose views cannot be loaded is left out.
+
+    Another package's view replaces one of this project; of two others, that of the first by name counts.
+    """
     found: dict[str, type[MessageView]] = {}
-    for entry in entry_points(group=GROUP):
+    of: dict[str, str] = {}
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
         try:
             table = msgspec.convert(entry.load(), dict[str, type])
             if wrong := [schema for schema, kind in table.items() if not isinstance(kind(), MessageView)]:
                 raise TypeError(f"the view of {wrong[0]} is not derived from MessageView")
             if bare := [schema for schema in table if not schema.partition("/")[2]]:
                 raise ValueError(f"the schema {bare[0]} lacks its version: write {bare[0].rstrip('/')}/1")
-            found |= table
-        except Exception as error:  # a module that is being written raises anything
+            for schema, kind in table.items():
+                if schema in of:
+                    log.warning("%s has a view of %s, too; that of %s is shown", entry.name, schema, of[schema])
+                elif VIEWS.get(schema) is not kind:
+                    found[schema], of[schema] = kind, entry.name
+        except (Exception, SystemExit) as error:  # a module that is being written raises anything
             log.warning("the views of %s are left out: %s", entry.name, complaint(error))
-    return found
+    return {**VIEWS, **found}
 
 
 def field_rows(body: object) -> list[FieldRow]:

@@ -52,6 +52,7 @@ def test_the_example_shows_its_message_once_its_package_is_installed(
     [
         "VIEWS = {",
         "raise RuntimeError('no library')",
+        "raise SystemExit('run me as a program')",
         "VIEWS = [1]",
         "class VIEWS: ...",
         "VIEWS = {'A/1': int}",
@@ -77,6 +78,29 @@ def test_a_package_with_a_fault_in_its_views_is_left_out_and_named(
     assert "the views of faulty are left out" in caplog.text
 
 
+def test_of_two_packages_with_a_view_of_one_schema_the_first_counts_and_the_other_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Which of them was shown depended on the order of folders, and nothing named the other."""
+    one = "from ui_console.model.message_views import MessageView\nclass Own(MessageView): ...\n"
+    for name in ("zebra", "ant"):
+        about = tmp_path / f"{name}-1.0.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (about / "entry_points.txt").write_text(f"[{GROUP}]\n{name} = {name}_views:VIEWS\n")
+        (tmp_path / f"{name}_views.py").write_text(f"{one}VIEWS = {{'Turned/1': Own, 'Frame/1': Own}}")
+    monkeypatch.syspath_prepend(tmp_path)
+    installed_views.cache_clear()
+    try:
+        found = installed_views()
+    finally:
+        installed_views.cache_clear()
+        for name in ("zebra", "ant"):
+            sys.modules.pop(f"{name}_views", None)
+    assert {found[schema].__module__ for schema in ("Turned/1", "Frame/1")} == {"ant_views"}
+    assert "zebra has a view of Turned/1, too; that of ant is shown" in caplog.text
+
+
 class Rowless(MessageView):
     def rows(self, fields: object) -> Any:
         return None
@@ -97,7 +121,22 @@ class Raising(MessageView):
         raise RuntimeError("no library")
 
 
-@pytest.mark.parametrize("kind", [Rowless, Textless, Pictureless, Raising])
+class Ugly(Exception):
+    def __str__(self) -> str:
+        raise LookupError
+
+
+class Unspeakable(MessageView):
+    def rows(self, fields: object) -> Any:
+        raise Ugly
+
+
+class Leaving(MessageView):
+    def rows(self, fields: object) -> Any:
+        raise SystemExit
+
+
+@pytest.mark.parametrize("kind", [Rowless, Textless, Pictureless, Raising, Unspeakable, Leaving])
 def test_a_view_that_returns_no_rows_or_picture_leaves_the_table_and_says_so(kind: type[MessageView]) -> None:
     view = KeyView("Turned/1", {"Turned/1": kind})
     view.take({"turn": 1.5}, 1.0, 1)
