@@ -61,7 +61,7 @@ def installed() -> Translations:
     for entry in entry_points(group=GROUP):
         try:
             found |= entry.load()
-        except Exception as error:  # a module that is being written raises anything
+        except (Exception, SystemExit) as error:  # a module that is being written raises anything
             log.warning("the translations of %s are left out: %s", entry.name, complaint(error))
     return found
 

@@ -36,7 +36,7 @@ def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
     for module in (*installed, *modules):
         try:
             importlib.import_module(module)
-        except Exception as error:  # a module that is being written raises anything
+        except (Exception, SystemExit) as error:  # a module that is being written raises anything
             log.warning("messages of %s are recorded without names: %s", module, complaint(error))
     named: dict[str, dict[str, type[Message]]] = defaultdict(dict)
     for kind in filter(_is_in_its_module, _derived(Message)):

@@ -209,15 +209,19 @@ def test_the_command_writes_a_new_file_and_tells_what_it_lacks(tmp_path: Path) -
     assert (again.returncode, "exists" in again.stderr) == (2, True), again.stderr
 
 
+@pytest.mark.parametrize(
+    ("raised", "told"),
+    [("OSError('no gauge')", "OSError: no gauge"), ("SystemExit('a program')", "SystemExit: a program")],
+)
 def test_a_package_whose_translations_cannot_be_loaded_is_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, raised: str, told: str
 ) -> None:
     about = tmp_path / "gauges-1.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: gauges\nVersion: 1\n")
     (about / "entry_points.txt").write_text(f"[{GROUP}]\ngauges = gauges_in_work:TRANSLATIONS\n")
-    (tmp_path / "gauges_in_work.py").write_text("\nraise OSError('no gauge')")
+    (tmp_path / "gauges_in_work.py").write_text(f"\nraise {raised}")
     monkeypatch.syspath_prepend(tmp_path)
     assert installed() == TRANSLATIONS
-    told = f"OSError: no gauge ({tmp_path / 'gauges_in_work.py'}, line 2)"
-    assert f"the translations of gauges are left out: {told}" in caplog.text
+    place = f"{tmp_path / 'gauges_in_work.py'}, line 2"
+    assert f"the translations of gauges are left out: {told} ({place})" in caplog.text

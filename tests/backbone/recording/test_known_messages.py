@@ -15,7 +15,12 @@ from resource_pool.messages import Frame
 
 @pytest.mark.parametrize(
     "text",
-    ["import not_installed_here", "def half_written(:", 'raise OSError("libgpu.so.1: cannot open shared object file")'],
+    [
+        "import not_installed_here",
+        "def half_written(:",
+        'raise OSError("libgpu.so.1: cannot open shared object file")',
+        "raise SystemExit",
+    ],
 )
 def test_a_module_that_cannot_be_imported_is_skipped_and_logged(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
