@@ -14,6 +14,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import logging
+import threading
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
@@ -101,9 +102,13 @@ class DriverExchanges:
     def made(self, build: Callable[[DriverSite], object], site: DriverSite) -> object:
         """Return a driver whose spontaneous failures count as failures of this driver."""
         mine: list[object] = []
+        loop, own_thread = asyncio.get_running_loop(), threading.get_ident()
 
         def failed(bug: object) -> None:
-            self._driver_failed(mine[0] if mine else None, as_bug(bug))
+            if threading.get_ident() == own_thread:
+                self._driver_failed(mine[0] if mine else None, as_bug(bug))
+            else:  # events and futures may be set in the loop's thread only
+                loop.call_soon_threadsafe(failed, bug)
 
         driver = build(dataclasses.replace(site, fail=failed))
         mine.append(driver)
