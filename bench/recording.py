@@ -30,7 +30,8 @@ from switch_time import NAME, Measured, fast_mission, measure, switches_s
 
 from backbone import run_files
 from backbone.recording.host_ear import HostEar
-from backbone.recording.reader import Recording, missing_numbers
+from backbone.recording.missing_numbers import missing_numbers
+from backbone.recording.reader import Recording
 
 SETTLE_S = 3.0  # chosen: the recorder's imports and its first questions are over
 

@@ -47,7 +47,8 @@ from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.host_ear import HostEar
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import Recording, missing_numbers
+from backbone.recording.missing_numbers import missing_numbers
+from backbone.recording.reader import Recording
 from backbone.recording.recorder import Recorder
 from backbone.recording.recovering import recover_file
 from backbone.recording.revival import Reviver

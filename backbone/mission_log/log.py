@@ -7,7 +7,6 @@ consoles.
 
 from __future__ import annotations
 
-import copy
 from collections import deque
 from collections.abc import Iterable, Sequence
 from itertools import accumulate, islice, takewhile
@@ -150,12 +149,6 @@ class MissionLog:
         found = chosen(map(self.people.named_event, filter(asked.reaches, self._events)), asked)
         kept = _newest_of_one_message(found[-asked.most :])
         return Log(kept, len(found) - len(kept), self._since_s)
-
-    def copied(self) -> MissionLog:
-        """Return an independent copy; both share the events, which never change."""
-        twin = MissionLog()
-        twin._events, twin._since_s, twin.people = self._events.copy(), self._since_s, copy.deepcopy(self.people)
-        return twin
 
     def _recall(self, events: Sequence[StoryEvent]) -> None:
         """Add earlier events; an event that is kept already is not added again."""

@@ -28,6 +28,7 @@ from backbone.scheduling.rules import SchedulingRules, aging_fault
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.spoken import counted
 
+_SNAPSHOT = f"{ScheduleSnapshot.__name__}/"
 _DECISIONS = tuple(f"{RC_MANAGER}/{conversation}" for conversation in (Conversation.DECISIONS, Conversation.ASK))
 
 
@@ -118,7 +119,7 @@ def schedule_at(recording: Recording, at_s: float, reviver: Reviver | None = Non
         NotRecorded: The recording has no earlier snapshot, or a decision after the snapshot is missing.
     """
     schedule, reviver = RecordedSchedule(), reviver or Reviver()
-    for message, told in _since_last_snapshot(recording, at_s, reviver):
+    for message, told in since_last_snapshot(recording, at_s, reviver):
         schedule.take(told, message)
     reviver.unread += schedule.unread
     if schedule.manager is None:
@@ -126,11 +127,16 @@ def schedule_at(recording: Recording, at_s: float, reviver: Reviver | None = Non
     return schedule.manager
 
 
-def _since_last_snapshot(
-    recording: Recording, at_s: float, reviver: Reviver
+def since_last_snapshot(
+    recording: Recording, at_s: float, reviver: Reviver | None = None
 ) -> list[tuple[Recorded, Decided | ScheduleSnapshot]]:
-    """Return the last snapshot before this mission time, and all decisions after it, in the order of their numbers."""
-    found, snapshot_s = list[tuple[Recorded, Decided | ScheduleSnapshot]](), -math.inf
+    """Return the last snapshot before this mission time, and all decisions after it, in the order of their numbers.
+
+    Without a snapshot, no decision is of use, and none is returned.
+    """
+    found, snapshot_s, reviver = list[tuple[Recorded, Decided | ScheduleSnapshot]](), -math.inf, reviver or Reviver()
+    if not any(schema.startswith(_SNAPSHOT) for _key, _source, schema in recording.channels().values()):
+        return found
     for message in recording.messages(_DECISIONS, 0.0, at_s, RC_MANAGER, newest_first=True):
         if message.at_s < snapshot_s:
             break  # messages of the same time may stand in any order

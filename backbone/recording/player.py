@@ -15,12 +15,12 @@ from backbone.addresses import LAUNCHER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.keys import COPIED, Conversation, address_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
-from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.hearing import is_meant
 from backbone.recording.presence import Presence
 from backbone.recording.read_ahead import ReadAhead, Ready
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.recorded_mission import RecordedMission
+from backbone.recording.restoring import mission_at
 from backbone.recording.revival import envelope_as_sent, message_as_sent
 from backbone.wire import Envelope, Message
 
@@ -40,7 +40,6 @@ class Player:
         since_s: Mission time at which it begins; earlier messages are known.
         keys: Patterns of the keys whose publications are played; none: all.
         next_step: Awaited before each publication, with the message; None: play in the recorded time.
-        checkpoints: Checkpoints of the same recording; None: the recording is read from its begin, and none is kept.
     """
 
     def __init__(
@@ -53,11 +52,10 @@ class Player:
         since_s: float,
         keys: tuple[str, ...] = (),
         next_step: Callable[[Recorded], Awaitable[None]] | None = None,
-        checkpoints: Checkpoints | None = None,
     ) -> None:
         self._bus, self._clock, self._recording = bus, clock, recording
         self._since_s, self._keys, self._next_step = since_s, keys, next_step
-        self._classes, self._checkpoints = classes, checkpoints or Checkpoints(classes, most=0)
+        self._classes = classes
         self._mission = RecordedMission(classes)
         self._ahead = ReadAhead(recording, classes, since_s, self._key_ahead)
         self._accepts = reduce(or_, classes.values())
@@ -81,12 +79,12 @@ class Player:
         """Number of recorded publications that were not played, because no class known here has their form."""
 
     def catch_up(self) -> None:
-        """Apply all earlier messages, and decode the next ones. Uses no bus, so it may run in a thread.
+        """Restore the state before the first message, and decode the next ones. Uses no bus, so it may run in a thread.
 
         Raises:
             NoRecording: The recording is damaged.
         """
-        self._mission = self._checkpoints.mission_at(self._recording, self._since_s)
+        self._mission = mission_at(self._recording, self._classes, self._since_s)
         self._mission.rate = self._clock.rate
         self._ahead.fill()
 

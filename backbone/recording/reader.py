@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import errno
-import math
-import os
 import struct
-import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import chain
@@ -16,24 +13,20 @@ from typing import IO, Any
 
 import msgspec
 from mcap.exceptions import McapError
-from mcap.reader import SeekingReader
 from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import CRCValidationError
-from mcap.summary import Summary
 from zstandard import ZstdError
 
 from backbone.errors import Refusal
+from backbone.recording.file_index import IndexedReader, MessagePlace, MessagePlaces, names_all
 from backbone.recording.hearing import is_meant
 from backbone.recording.translation import Translated
 from backbone.recording.writer import ABOUT, NS, PROFILE
-from backbone.wire import MAX_LARGE_MESSAGE_BYTES
 
-MOST_RECORD_BYTES = 2 * MAX_LARGE_MESSAGE_BYTES  # chosen: a whole chunk fits; a damaged length asks for terabytes
 MOST_LEVELS = 850  # chosen: Python's limit of 1000 calls, less six times the calls that lead to its loop
 NOTHING_OF_ONE = "Name a recording; this file has nothing of one."
 DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
 _MAGIC = b"\x89MCAP0\r\n"  # MCAP specification: the begin of every file
-_END = struct.Struct("<BQQQI8x")  # MCAP specification, op 0x02 and the magic: the end of every whole file
 
 
 class NoRecording(Refusal):
@@ -127,16 +120,15 @@ class Recording:
             why = "it begins as another kind of file" if file.tell() else "the file is empty"
             raise NoRecording(f"no recording: {why}", remedy=NOTHING_OF_ONE)
         try:
-            check_index(file)
-            self._reader = SeekingReader(file, validate_crcs=True, record_size_limit=MOST_RECORD_BYTES)
+            self._reader = IndexedReader(file)
             profile, summary = self._reader.get_header().profile, self._reader.get_summary()
         except (*DAMAGED, OSError) as error:
             raise NoRecording(f"no whole recording: {error}") from error
         if profile != PROFILE:
             raise NotOfMessages(f"the file is of profile {profile!r}, a recording of {PROFILE!r}")
-        if summary is None or not names_all(summary):
+        if not names_all(summary):
             raise NoRecording("the recording has no complete index")
-        self._summary: Summary = summary
+        self._summary, self._places = summary, MessagePlaces(file, summary)
         self._name = getattr(file, "name", "the recording")
 
     def contents(self) -> Contents:
@@ -171,6 +163,31 @@ class Recording:
             files = (one for one in self._reader.iter_attachments() if one.name == "mission.xml")
             found = next(files, None)
             return found.data.decode() if found is not None else ""
+
+    def channels(self) -> dict[int, tuple[str, str, str]]:
+        """Return key, sender and schema of each channel; the key is empty if the messages themselves name it."""
+        return {number: _named(channel) for number, channel in self._summary.channels.items()}
+
+    def newest_first(self, channels: set[int], before_ns: int) -> Iterator[tuple[MessagePlace, int]]:
+        """Yield the places of all messages before a time in these channels, with their channels; reads no message.
+
+        Args:
+            channels: The caller removes each channel whose earlier messages it does not need; without any, this ends.
+
+        Raises:
+            NoRecording: The recording is damaged.
+        """
+        with _refusing_damage(self._name):
+            yield from self._places.newest_first(channels, before_ns)
+
+    def at(self, channel: int, place: MessagePlace) -> Recorded:
+        """Return the message of a channel at a place.
+
+        Raises:
+            NoRecording: The recording is damaged.
+        """
+        with _refusing_damage(self._name):
+            return _recorded(self._summary.channels[channel], self._places.message(channel, place))
 
     def messages(
         self,
@@ -214,7 +231,10 @@ class Recording:
         }
         end_ns = None if until_s is None else round(until_s * NS)
         begin_ns = max(0, round(since_s * NS))
-        found = self._reader.iter_messages(topics, starting_at=begin_ns, ending_at=end_ns, reverse=newest_first)
+        reader = self._reader.between(begin_ns, end_ns)
+        if reader is None:
+            return
+        found = reader.iter_messages(topics, starting_at=begin_ns, ending_at=end_ns, reverse=newest_first)
         with _refusing_damage(self._name):
             for schema, channel, message in found:
                 recorded = _recorded(channel, message)
@@ -241,116 +261,6 @@ def open_file(path: Path) -> IO[bytes]:
     if path.exists() and not path.is_file() and not path.is_dir():
         raise OSError(errno.ESPIPE, "it is no regular file", str(path))
     return path.open("rb")
-
-
-def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
-    """Return sender → number of messages missing between its first and its last, only for senders that miss any.
-
-    Each sender numbers its messages, and a restarted sender begins again. Messages that are missing between the end of
-    a sender and its restart are unknown. A number is missing if its message was lost, if its key was not recorded, or
-    if it is a question without an answer. A question from before the begin, whose answer came later, does not count.
-
-    Args:
-        messages: In the order of sending.
-    """
-    lives: dict[str, list[_SenderLife]] = {}
-    began_s = math.inf
-    for message in messages:
-        began_s = min(began_s, message.heard_s)
-        if message.source:
-            own = lives.setdefault(message.source, [])
-            if not own or own[-1].is_over(message):
-                own.append(_SenderLife())
-            own[-1].take(message, began_s)
-    missing = {source: sum(life.gaps(began_s) for life in own) for source, own in sorted(lives.items())}
-    return {source: count for source, count in missing.items() if count}
-
-
-@dataclass(slots=True)
-class _SenderLife:
-    """The message numbers of one life of a sender; it takes the same memory however many they are.
-
-    Attributes:
-        newest: Largest number.
-        lowest: Smallest number that counts.
-        highest: Largest number that counts.
-        count: How many count.
-        at_s: Mission time of the newest message.
-        together: Numbers of that time; only these come in any order.
-        early: Times and numbers of messages that were sent before the recorder heard any; they do not count yet.
-    """
-
-    newest: float = -math.inf
-    lowest: float = math.inf
-    highest: float = -math.inf
-    count: int = 0
-    at_s: float = -math.inf
-    together: set[int] = field(default_factory=set)
-    early: list[tuple[float, int]] = field(default_factory=list)
-
-    def is_over(self, message: Recorded) -> bool:
-        """Return whether this message begins the sender's next life."""
-        return message.sequence <= self.newest and message.at_s > self.at_s
-
-    def take(self, message: Recorded, began_s: float) -> None:
-        """Note the number of a message."""
-        if message.at_s != self.at_s:
-            self.at_s, self.together = message.at_s, set()
-        if message.sequence in self.together:
-            return
-        self.together.add(message.sequence)
-        self.newest = max(self.newest, message.sequence)
-        if message.at_s < began_s:
-            self.early.append((message.at_s, message.sequence))
-        else:
-            self._count(message.sequence)
-
-    def gaps(self, began_s: float) -> int:
-        """Return how many numbers between the lowest and the highest are missing; messages before the begin are not."""
-        for at_s, number in self.early:
-            if at_s >= began_s:
-                self._count(number)
-        return int(self.highest - self.lowest) + 1 - self.count if self.count else 0
-
-    def _count(self, number: int) -> None:
-        self.lowest, self.highest = min(self.lowest, number), max(self.highest, number)
-        self.count += 1
-
-
-def check_index(file: IO[bytes]) -> None:
-    """Return if the index is as it was written; the library checks only the messages.
-
-    Raises:
-        ValueError: The index is damaged, or the file has no end.
-    """
-    end = file.seek(0, os.SEEK_END) - _END.size
-    if end < 0:
-        raise ValueError("it is too short")
-    file.seek(end)
-    footer = file.read(_END.size)
-    _operation, _length, begin, _offsets, checksum = _END.unpack(footer)
-    if not 0 < begin <= end:
-        raise ValueError("it has no index")
-    file.seek(begin)
-    if zlib.crc32(file.read(end - begin) + footer[: _END.size - 12]) != checksum:
-        raise ValueError("its index is damaged")
-    file.seek(0)
-
-
-def names_all(index: Summary) -> bool:
-    """Return whether the index leads to all messages and facts of its file; other writers may leave parts of it out.
-
-    Without it, the library reads messages unchecked and only forwards, and finds no facts.
-    """
-    numbers = index.statistics
-    return numbers is not None and (
-        (numbers.chunk_count > 0 or not numbers.message_count)
-        and numbers.chunk_count == len(index.chunk_indexes)
-        and numbers.metadata_count == len(index.metadata_indexes)
-        and numbers.attachment_count == len(index.attachment_indexes)
-        and numbers.schema_count == len(index.schemas)
-        and numbers.channel_count == len(index.channels)
-    )
 
 
 def _named(channel: Channel) -> tuple[str, str, str]:

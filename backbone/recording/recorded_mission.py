@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import msgspec
 
@@ -35,7 +34,6 @@ HISTORY = frozenset(
     {Conversation.ALIVE, Conversation.ASK, Conversation.LOG, Conversation.OPERATORS, Conversation.DECISIONS}
 )
 """Conversations of which all earlier messages determine the answers."""
-_TABLES = ("present", "there", "_states", "_guests", "_newest", "_open", "_answers")
 _FOLLOWED = frozenset(
     kind.__name__ for kind in (Presence, ComponentState, StoryEvent, OperatorActed, Decided, ScheduleSnapshot)
 )
@@ -71,6 +69,8 @@ class RecordedMission:
 
     def __init__(self, classes: Mapping[str, type[Message]]) -> None:
         self.now_s, self.rate = 0.0, 1.0
+        self.earlier: Callable[[str, Message], Message | None] = lambda _address, _question: None
+        """Finds the answer to a question from before the messages that were taken; settable."""
         self.present: dict[str, None] = {}
         self.there = dict.fromkeys((NAMESERVER, LAUNCHER))
         self._classes = classes
@@ -112,12 +112,32 @@ class RecordedMission:
         if said is not None and self._is_of_a_read(message):
             self._asked_or_answered(address, message, said)
 
-    def copied(self) -> RecordedMission:
-        """Return an independent copy; both share the messages, which never change."""
-        twin = copy.copy(self)
-        vars(twin).update({name: copy.copy(getattr(self, name)) for name in _TABLES})
-        vars(twin).update(_log=self._log.copied(), _schedule=copy.deepcopy(self._schedule))
-        return twin
+    def restore(
+        self,
+        *,
+        at_s: float,
+        present: Iterable[str],
+        there: Iterable[str],
+        states: Mapping[str, ComponentState],
+        newest: Iterable[Recorded],
+        events: Iterable[StoryEvent],
+        decisions: Iterable[tuple[Recorded, Decided | ScheduleSnapshot]],
+    ) -> None:
+        """Take over a state in place of the own one, except for questions and answers.
+
+        Args:
+            newest: The newest message of each key that carries a state.
+            events: The newest events, oldest first.
+            decisions: The last snapshot of the schedule, and what was decided since.
+        """
+        self.now_s, self._states = at_s, dict(states)
+        self.present, self.there = dict.fromkeys(present), dict.fromkeys(there)
+        self._newest = {(one.key, one.schema): one for one in newest}
+        self._log, self._schedule = MissionLog(), RecordedSchedule()
+        for event in events:
+            self._log.add(event)
+        for message, said in decisions:
+            self._schedule.take(said, message)
 
     def newest(self) -> Iterator[Recorded]:
         """Yield the newest message of each key that carries a state."""
@@ -161,7 +181,7 @@ class RecordedMission:
                 return Answers(self._schedule.manager).why(name, self.now_s)
         if not type(question).__name__.startswith(READS):
             raise TakesNoCommands(f"{type(question).__name__} is a command, and {address} is a recording")
-        known = self._answers.get(asked_of(address, question))
+        known = self._answers.get(asked_of(address, question)) or self.earlier(address, question)
         if known is None:
             raise NotAnswered(f"{address} did not answer {type(question).__name__} until {self.now_s:.3f} s")
         return known

@@ -19,19 +19,16 @@ from typing import IO, Any, NamedTuple, cast
 from mcap.data_stream import RecordBuilder
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import MAGIC_SIZE, StreamReader, breakup_chunk
 from mcap.summary import Summary
 
+from backbone.recording.file_index import MOST_RECORD_BYTES, IndexedReader, names_all
 from backbone.recording.reader import (
     DAMAGED,
-    MOST_RECORD_BYTES,
     NOTHING_OF_ONE,
     NoRecording,
     NotOfMessages,
-    check_index,
-    names_all,
     open_file,
 )
 from backbone.recording.writer import PROFILE, begun_writer
@@ -236,9 +233,8 @@ def _took_chunk(whole: _WholeRecording, chunk: Chunk) -> bool:
 def _index(file: IO[bytes]) -> Summary | None:
     """Return the index; None: it is damaged, incomplete or not there."""
     try:
-        check_index(file)
-        found = SeekingReader(file, record_size_limit=MOST_RECORD_BYTES).get_summary()
-        return found if found is not None and names_all(found) else None
+        found = IndexedReader(file).get_summary()
+        return found if names_all(found) else None
     except (*DAMAGED, OSError):
         return None
     finally:

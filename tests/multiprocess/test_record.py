@@ -30,7 +30,8 @@ from backbone.keys import Conversation
 from backbone.keys import key as key_of
 from backbone.rc_manager.messages import AskSchedule, AskWhy
 from backbone.recording.decisions import decided_anew
-from backbone.recording.reader import Recorded, Recording, missing_numbers
+from backbone.recording.missing_numbers import missing_numbers
+from backbone.recording.reader import Recorded, Recording
 from backbone.recording.reasons import reasons_at
 from backbone.scheduling.requests import UnknownRequest
 from backbone.scheduling.views import Schedule, Why

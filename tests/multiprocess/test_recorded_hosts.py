@@ -17,7 +17,8 @@ from three_hosts import BIN, ThreeHosts, mission_on_three_hosts
 
 from backbone.keys import address_of
 from backbone.recording.joining import join
-from backbone.recording.reader import Recorded, Recording, missing_numbers
+from backbone.recording.missing_numbers import missing_numbers
+from backbone.recording.reader import Recorded, Recording
 
 pytestmark = [pytest.mark.processes, pytest.mark.thorough, pytest.mark.timeout(400)]
 

@@ -17,7 +17,6 @@ from backbone.command_line.unusable_file import FileUnusable
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
-from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.known_messages import message_classes
 from backbone.recording.markers import markers_in
 from backbone.recording.playback import Playback
@@ -63,7 +62,7 @@ class Performance(Generic[Console]):
         self.player, self.console, self._close = player, console, close
 
     async def begin(self) -> None:
-        """Apply the messages before this time; the screen stays usable meanwhile.
+        """Restore the state before this time; the screen stays usable meanwhile.
 
         Raises:
             NoRecording: The recording is damaged.
@@ -111,7 +110,6 @@ class RecordedPlay(Generic[Console]):
         self.playback = Playback(machine, found.begin_s, found.end_s)
         self.markers = markers_in(self._recording)
         """The markers in the order of time."""
-        self._checkpoints = Checkpoints(self.classes)
         self._is_elsewhere, self._arrived, self._ended = asyncio.Event(), asyncio.Event(), asyncio.Event()
         self._performance = self._new_performance()
 
@@ -187,7 +185,7 @@ class RecordedPlay(Generic[Console]):
         network = LocalNetwork(self.mission)
         bus = network.join(f"{Subsystem.BACKBONE}/replay", playback)
         recording, since_s = self.reopened(), playback.now_s()
-        player = Player(bus, playback, recording, self.classes, since_s=since_s, checkpoints=self._checkpoints)
+        player = Player(bus, playback, recording, self.classes, since_s=since_s)
         console = self._new_console(launch, network, playback)
         return Performance(player, console, lambda: asyncio.ensure_future(bus.close()))
 

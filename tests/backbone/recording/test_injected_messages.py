@@ -9,10 +9,10 @@ from backbone.component.messages import ComponentState, LifeState
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.rc_manager.messages import AskSchedule, Decided, ScheduleSnapshot
-from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
 from backbone.recording.reasons import reasons_at
+from backbone.recording.restoring import mission_at
 from backbone.scheduling.events import RcKnown, Wanted
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
@@ -34,7 +34,7 @@ def test_only_the_rc_manager_decides() -> None:
         Said(3.0, RC_MANAGER, Conversation.DECISIONS, Decided(7, 3.0, Wanted("nobody")), PERSON),
         Said(4.0, RC_MANAGER, Conversation.DECISIONS, snapshot, PERSON),
     ]
-    mission = Checkpoints(CLASSES).mission_at(Recording(recorded(said)), 5.0)
+    mission = mission_at(Recording(recorded(said)), CLASSES, 5.0)
     schedule = mission.answer(RC_MANAGER, AskSchedule())
     assert isinstance(schedule, Schedule)
     assert [rc.rc for rc in schedule.rcs] == ["scout1"]
@@ -48,6 +48,6 @@ def test_only_a_token_shows_presence() -> None:
     ]
     recording = Recording(recorded(said))
     assert reasons_at(recording, "scout1", 4.0).lines(4.0) == ["scout1 is ready on base: drives"]
-    found = Checkpoints(CLASSES).mission_at(recording, 4.0).answer(NAMESERVER, ListComponents())
+    found = mission_at(recording, CLASSES, 4.0).answer(NAMESERVER, ListComponents())
     assert isinstance(found, Components)
     assert [one.address for one in found.components] == [SCOUT]

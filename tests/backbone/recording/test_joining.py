@@ -16,8 +16,9 @@ from backbone.component.messages import AskTime, ComponentState, LifeState, LogL
 from backbone.keys import Conversation
 from backbone.keys import key as key_of
 from backbone.recording.joining import Joined, OtherMission, join
+from backbone.recording.missing_numbers import missing_numbers
 from backbone.recording.presence import Presence
-from backbone.recording.reader import NoRecording, NotOfMessages, Recorded, Recording, missing_numbers
+from backbone.recording.reader import NoRecording, NotOfMessages, Recorded, Recording
 from backbone.recording.writer import NS, RecordingWriter
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 

@@ -16,11 +16,11 @@ from backbone.keys import Conversation
 from backbone.keys import key as key_of
 from backbone.launcher.endings import ExitCode
 from backbone.rc_manager.messages import ScheduleSnapshot
-from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.markers import markers_in
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
 from backbone.recording.reasons import reasons_at
+from backbone.recording.restoring import mission_at
 from backbone.recording.revival import message_as_sent
 from backbone.recording.writer import RecordingWriter
 from backbone.wire import WIRE_VERSION, Envelope, write
@@ -77,5 +77,5 @@ def test_the_reasons_are_told_without_it() -> None:
 def test_the_line_of_a_page_and_the_playing_go_on_without_it() -> None:
     recording = Recording(night())
     assert [marker.line for marker in markers_in(recording)] == ["scout1: begins", "scout1: goes on"]
-    mission = Checkpoints(CLASSES).mission_at(recording, 3.0)
+    mission = mission_at(recording, CLASSES, 3.0)
     assert list(mission.present) == [SCOUT]

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.recording.reader import Recorded, missing_numbers
+from backbone.recording.missing_numbers import missing_numbers
+from backbone.recording.reader import Recorded
 
 SENDERS = ("resource_pool/scout1", "backbone/rc_manager")
 LONGEST = 12

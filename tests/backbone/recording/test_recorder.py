@@ -27,11 +27,12 @@ from backbone.component.messages import (
 )
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.files import RecordingFiles
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import Recorded, Recording, missing_numbers
+from backbone.recording.missing_numbers import missing_numbers
+from backbone.recording.reader import Recorded, Recording
 from backbone.recording.recorder import FLUSH_EACH_S, LEAST_FREE_BYTES, Recorder
+from backbone.recording.restoring import mission_at
 from backbone.wire import Envelope
 
 CLASSES = message_classes()
@@ -357,7 +358,7 @@ def test_each_further_file_tells_by_itself_who_is_there_and_in_which_state(tmp_p
 
     run_virtual(play())
     with (tmp_path / "it-2.mcap").open("rb") as file:
-        mission = Checkpoints(CLASSES).mission_at(Recording(file), 10.0)
+        mission = mission_at(Recording(file), CLASSES, 10.0)
     listed = mission.answer(NAMESERVER, ListComponents())
     assert isinstance(listed, Components)
     assert [one.address for one in listed.components] == [NAMESERVER, "resource_pool/scout1"]

@@ -1,4 +1,4 @@
-"""A mission that is read on from a checkpoint is the one that is read from the begin."""
+"""A mission that is restored at an instant is the one that is read from the begin."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from backbone.keys import Conversation
 from backbone.mission_log.log import AskLog, Log
 from backbone.nameserver.messages import ListComponents
 from backbone.picture.health import HealthWord, MissionHealth
-from backbone.recording.checkpoints import EACH_S, Checkpoints
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
 from backbone.recording.recorded_mission import RecordedMission
+from backbone.recording.restoring import mission_at
 from backbone.recording.writer import NS
 from backbone.wire import Message, schema_of
 from resource_pool.messages import Frame
 
-LAST_S = 5 * EACH_S
+LAST_S = 150.0
 QUESTIONS = [(SCOUT, AskState()), (SCOUT, AskParameters()), (LAUNCHER, AskLog()), (NAMESERVER, ListComponents())]
 kinds = st.sampled_from(["state", "event", "here", "gone", "asked", "picture"])
 
@@ -55,7 +55,7 @@ def messages(at_s: float, kind: str, number: int) -> list[Said]:
             asker = f"ui_console/anna-{number}"
             return [
                 Said(at_s, SCOUT, Conversation.ASK, AskParameters(), asker),
-                Said(at_s, SCOUT, Conversation.ASK, Parameters({"speed": number}), SCOUT, f"{asker}#1"),
+                Said(at_s + 3.0, SCOUT, Conversation.ASK, Parameters({"speed": number}), SCOUT, f"{asker}#1"),
             ]
     return [Said(at_s, SCOUT, Conversation.ALIVE, Presence(kind == "here"), "")]
 
@@ -75,16 +75,21 @@ def told(mission: RecordedMission) -> list[Message | str]:
     said=st.lists(st.tuples(st.floats(0.0, LAST_S), kinds), min_size=1, max_size=40),
     looks=st.lists(st.floats(0.0, LAST_S + 1.0), min_size=1, max_size=6),
 )
-def test_from_a_checkpoint_or_from_the_begin_a_mission_is_the_same(said: list[tuple[float, str]], looks: list[float]):
+def test_restored_or_read_from_the_begin_a_mission_is_the_same(said: list[tuple[float, str]], looks: list[float]):
     ordered = [one for number, (at_s, kind) in enumerate(sorted(said)) for one in messages(at_s, kind, number)]
-    recording, checkpoints = Recording(recorded(ordered)), Checkpoints(CLASSES)
+    recording = Recording(recorded(ordered))
     for at_s in looks:
         whole = RecordedMission(CLASSES)
         for message in recording.messages():
             if round(message.at_s * NS) < round(at_s * NS):
                 whole.take(message)
-        for fresh in (checkpoints, Checkpoints(CLASSES), Checkpoints(CLASSES, most=0)):
-            assert told(fresh.mission_at(recording, at_s)) == told(whole)
+        restored = mission_at(recording, CLASSES, at_s)
+        assert told(restored) == told(whole)
+        assert (restored.now_s, {*restored.present}, {*restored.there}) == (
+            whole.now_s,
+            {*whole.present},
+            {*whole.there},
+        )
 
 
 class CountingClasses(dict[str, type[Message]]):
@@ -112,7 +117,7 @@ def test_states_and_commands_which_answer_no_question_are_not_restored() -> None
     ]
     said += messages(20.0, "asked", 7)
     classes = CountingClasses()
-    mission = Checkpoints(classes).mission_at(Recording(recorded(said)), 30.0)
+    mission = mission_at(Recording(recorded(said)), classes, 30.0)
     assert mission.answer(SCOUT, AskParameters()) == Parameters({"speed": 7})
     assert [one.schema for one in mission.newest()] == [schema_of(MissionHealth)]
     assert classes.restored == {schema_of(AskParameters): 1, schema_of(Parameters): 1}
@@ -124,6 +129,6 @@ def test_messages_of_the_asked_instant_itself_are_not_known_yet(times: list[int]
     events = [messages(at_s, "event", number) for number, at_s in enumerate(ordered)]
     recording = Recording(recorded([one for said in events for one in said]))
     at_s = data.draw(st.sampled_from(ordered))
-    log = Checkpoints(CLASSES).mission_at(recording, at_s).answer(LAUNCHER, AskLog())
+    log = mission_at(recording, CLASSES, at_s).answer(LAUNCHER, AskLog())
     assert isinstance(log, Log)
     assert [event.what for event in log.events] == [str(number) for number, one in enumerate(ordered) if one < at_s]
