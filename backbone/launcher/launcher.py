@@ -19,7 +19,7 @@ from backbone.authentication import SECRET_NAME
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, LifeState, LogLevel, Stop, Stopping
+from backbone.component.messages import Absence, ComponentState, LifeState, LogLevel, Stop, Stopping
 from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnded, Processes, ProcessFell
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
@@ -42,7 +42,7 @@ from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch, ends_before
 from backbone.launcher.last_run import run_last
 from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
-from backbone.launcher.mission_recorder import MissionRecorder
+from backbone.launcher.mission_recorder import MissionRecorder, absences_of
 from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
@@ -131,6 +131,7 @@ class Launcher(Component[NoParameters]):
             self._recorder.on_changed = partial(self._recorder_changed, self._description.name)
             async with self._step("recorder"):
                 await self._recorder.begin()
+            self.publish_news()
             self.start_task(self._recorder.keep(), "recorder")
         for launch in core_launches(self._description, self.launch, self._options):
             async with self._step(launch.name):
@@ -168,6 +169,7 @@ class Launcher(Component[NoParameters]):
     def _recorder_changed(self, name: str, what: str) -> None:
         self.publish_event(name, what, LogLevel.WARNING)
         self.changed()
+        self.publish_news()  # also before this launcher is ready
 
     def _is_deaf(self) -> bool:
         return any(absence.name == component_of(NAMESERVER) for absence in self._keeper.absences())
@@ -240,6 +242,11 @@ class Launcher(Component[NoParameters]):
         super().changed()
         self._health_watch.notice()
 
+    def component_state(self) -> ComponentState:
+        """Return the state; before the services are started, with the recorder that they wait for."""
+        state, wanted = super().component_state(), absences_of(self._recorder)
+        return msgspec.structs.replace(state, absent=wanted) if self.state is LifeState.CONNECTING else state
+
     def absences(self) -> list[Absence]:
         """Return the absent core services, components and machines, and the absences of the health watch."""
         return [*self._own_absences(), *self._health_watch.absences()]
@@ -250,8 +257,7 @@ class Launcher(Component[NoParameters]):
         if self.outcome.ready_after_s is None:
             name, doing = self._description.name, self._being_started()
             mission.append(Absence(name, 0.0, "not all of it is ready", doing, is_start=True))
-        lost = self._recorder.absence() if self._recorder is not None else None
-        recorders = [*([lost] if lost is not None else []), *self._hand_recorders.absences()]
+        recorders = [*absences_of(self._recorder), *self._hand_recorders.absences()]
         return [*core, *mission, *self._others.absences(), *recorders]
 
     def _being_started(self) -> str:
@@ -290,14 +296,11 @@ class Launcher(Component[NoParameters]):
 
     async def _wait_for_other_hosts(self) -> None:
         """Return as soon as every declared machine has its creator in the mission."""
+        say = self._observer.announce
         if self._others.missing:
-            self._observer.announce(
-                f"the mission's secret, for its other hosts: {Path(self.launch.run_directory) / SECRET_NAME}"
-            )
+            say(f"the mission's secret, for its other hosts: {Path(self.launch.run_directory) / SECRET_NAME}")
         for host in self._others.missing:
-            self._observer.announce(
-                f"waiting for host {host}; copy the secret there and type: {self._others.command(host)}"
-            )
+            say(f"waiting for host {host}; copy the secret there and type: {self._others.command(host)}")
         while self._others.missing:
             await asyncio.gather(*(self._wait_for_host(host) for host in self._others.missing))
 
@@ -311,9 +314,8 @@ class Launcher(Component[NoParameters]):
     async def _start_mission(self) -> None:
         await self._wait_for_other_hosts()
         description = self._description
-        async with self._step(
-            "simulated world and resource controllers" if description.components else "resource controllers"
-        ):
+        hardware = "simulated world and resource controllers" if description.components else "resource controllers"
+        async with self._step(hardware):
             await self._wishes.start_all(hardware_orders(description))
         if description.units:
             async with self._step("execution units"):
@@ -370,10 +372,8 @@ class Launcher(Component[NoParameters]):
 
     async def _stop_other_hosts(self) -> None:
         """Ask the other machines to end their creators, and wait; an unreachable machine ends its creator by itself."""
-        stops = (
-            self.bus.ask(offer, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
-            for offer in self._others.offering
-        )
+        stop, soon_s = Stop("the mission ends"), LISTING_TIME_S
+        stops = (self.bus.ask(offer, stop, Stopping, within_s=soon_s) for offer in self._others.offering)
         await asyncio.gather(*stops, return_exceptions=True)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(STOP_TIME_S):

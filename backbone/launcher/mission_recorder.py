@@ -1,8 +1,8 @@
 """The recorder of a mission, or of one of its hosts, that was started with ``--record``: a process of its own.
 
-It begins before the first component and ends after the last. If it ends early, the recording continues in a further
-file. If its file cannot grow, it is absent with the reason, on a full disc until there is room. If it cannot begin, it
-is tried again. If it hangs, it is absent until it responds again.
+It begins before the first component, which waits for it, and ends after the last. If it ends early, the recording
+continues in a further file. If its file cannot grow, it is absent with the reason, on a full disc until there is room.
+If it cannot begin, it is tried again. If it hangs, it is absent until it responds again.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ from backbone.launcher.endings import ExitCode
 from backbone.launcher.recorder_signs import watch
 from backbone.mission.model import MissionDescription
 from backbone.ranges import LONGEST_LINE
+from backbone.waiting import end_tasks
 
-BEGUN_WITHIN_S = 20.0  # chosen: as long as a component has to become ready
+BEGUN_WITHIN_S = 20.0  # chosen: as long as a component has to become ready; a machine that swaps needs longer
 ENDED_WITHIN_S = 10.0  # chosen: writing the index of an hour takes less than a second
 AGAIN_AFTER_S = 1.0  # chosen: the cause of its end may be over by then; seconds of the machine
 AGAIN_AT_LEAST_EACH_S = 60.0  # chosen: a process that begins for nothing each minute takes no time from others
@@ -110,20 +111,23 @@ class MissionRecorder:
         self._process: Process | None = None
         self._reading: asyncio.Task[str] | None = None
         self._watching: asyncio.Task[None] | None = None
-        self._absence: Absence | None = None
+        self._absence: Absence | None = self._not_begun()
 
     def absence(self) -> Absence | None:
         """Return the recorder as absent while it does not run or respond."""
         return self._absence
 
-    async def begin(self) -> None:
+    async def begin(self, *, is_awaited: bool = True) -> None:
         """Start the recorder; return when it listens.
+
+        Args:
+            is_awaited: True: wait for it as long as it runs; after ``BEGUN_WITHIN_S``, its absence has the remedy.
+                False: end it then.
 
         Raises:
             RecorderFailed: The recorder did not begin; the detail has the reason.
         """
-        if self._absence is None:
-            self._absence = Absence(NAME, self._clock.now_s(), "it does not listen yet", "components here wait for it")
+        self._absence = self._absence or self._not_begun()
         self._reading = None
         try:
             self._process = process = await self._started()
@@ -131,11 +135,15 @@ class MissionRecorder:
             raise RecorderFailed(f"the recorder did not begin: {error}") from error
         assert process.stderr is not None  # noqa: S101  a pipe
         lines = _PrintedLines(process.stderr)
+        telling = asyncio.create_task(self._tell_facts(process, lines), name="what the recorder says first")
         try:
-            async with asyncio.timeout(BEGUN_WITHIN_S):
-                said = await self._tell_facts(process, lines)
-        except TimeoutError:
-            said = f"it did not begin within {BEGUN_WITHIN_S:g} s"
+            await asyncio.wait({telling}, timeout=BEGUN_WITHIN_S)
+            if is_awaited and not telling.done():
+                self._is_late(process)
+                await asyncio.wait({telling})
+            said = telling.result() if telling.done() else f"it did not begin within {BEGUN_WITHIN_S:g} s"
+        finally:
+            await end_tasks(telling)
         self._reading = asyncio.create_task(_last_line(process, lines), name="what the recorder says")
         if BEGUN not in said:
             await self.end()
@@ -147,7 +155,7 @@ class MissionRecorder:
     async def begin_or_be_lost(self) -> None:
         """Start the recorder; return when it listens, or when it did not begin. ``keep`` then starts it again."""
         try:
-            await self.begin()
+            await self.begin(is_awaited=False)
         except RecorderFailed as error:
             self._lost(error.detail, "it is tried again", error.remedy)
 
@@ -174,7 +182,7 @@ class MissionRecorder:
         while True:
             await self._clock.sleep_s(rest_s * self._clock.rate)
             try:
-                await self.begin()
+                await self.begin(is_awaited=False)
             except RecorderFailed as error:
                 rest_s = min(2.0 * rest_s, AGAIN_AT_LEAST_EACH_S)
                 self._lost(error.detail, f"it is tried again in {rest_s:g} s", error.remedy)
@@ -241,6 +249,16 @@ class MissionRecorder:
         last = await asyncio.shield(self._reading)
         return last or f"exit code {await self._process.wait()}"
 
+    def _not_begun(self) -> Absence:
+        return Absence(NAME, self._clock.now_s(), "it does not listen yet", "components here wait for it")
+
+    def _is_late(self, process: Process) -> None:
+        cause, doing = f"it has not begun within {BEGUN_WITHIN_S:g} s", "components here wait for it"
+        remedy = f"Wait, if this machine is busy, or 'kill -9 {process.pid}'; then the mission does not come up."
+        since_s = self._absence.since_s if self._absence is not None else self._clock.now_s()
+        self._absence = Absence(NAME, since_s, cause, doing, remedy)
+        self.on_changed(f"waits for its recorder: {cause}")
+
     def _silent(self, is_silent: bool) -> None:
         if self._process is None or self._process.returncode is not None:
             return
@@ -259,6 +277,12 @@ class MissionRecorder:
         self._absence = Absence(NAME, self._clock.now_s(), cause, doing, remedy)
         if not is_known:
             self.on_changed(f"lost its recorder: {cause}{f'; {doing}' if doing else ''}")
+
+
+def absences_of(recorder: MissionRecorder | None) -> list[Absence]:
+    """Return the recorder while it is absent; None: nothing is to be recorded."""
+    lost = recorder.absence() if recorder is not None else None
+    return [] if lost is None else [lost]
 
 
 class _PrintedLines:

@@ -129,7 +129,7 @@ def test_a_mission_that_waits_for_its_recorder_says_so_and_ends_without_it(local
             await clock.sleep_s(14.0)
             picture = await look(network.join("ui_console/status", clock), clock.now_s())
             assert picture.health.word is HealthWord.STARTING
-            assert [absence.name for absence in picture.health.absent] == ["local"]
+            assert [absence.name for absence in picture.health.absent] == ["local", "recorder"]
             launcher.end("the test is over")
             await asyncio.wait_for(running, 1.0)
 

@@ -108,6 +108,45 @@ async def test_one_that_prints_something_first_has_begun(
         assert left(tmp_path) == []
 
 
+async def test_one_that_needs_long_to_begin_is_waited_for_and_named_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A recorder on a machine that swapped needed 25 s, and the mission did not come up."""
+    monkeypatch.setattr(mission_recorder, "BEGUN_WITHIN_S", 0.1)
+    waits = "while ! test -e may; do sleep 0.05; done; echo records to night.mcap >&2"
+    recorder, changes = played(tmp_path, waits, monkeypatch), list[str]()
+    recorder.on_changed = changes.append
+    assert recorder.absence() is not None, "it is named from the first moment on"
+    beginning = asyncio.create_task(recorder.begin())
+    try:
+        await until(lambda: changes != [])
+        absent = recorder.absence()
+        assert changes == ["waits for its recorder: it has not begun within 0.1 s"]
+        assert absent is not None
+        assert "kill -9 " in absent.remedy
+        assert not beginning.done()
+        (tmp_path / "may").touch()
+        await beginning
+        assert recorder.absence() is None
+    finally:
+        await end_tasks(beginning)
+        await recorder.end()
+        assert left(tmp_path) == []
+
+
+async def test_one_that_is_killed_while_it_is_waited_for_did_not_begin(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mission_recorder, "BEGUN_WITHIN_S", 0.1)
+    recorder, changes = played(tmp_path, "", monkeypatch), list[str]()
+    recorder.on_changed = changes.append
+    beginning = asyncio.create_task(recorder.begin())
+    await until(lambda: changes != [])
+    left(tmp_path)
+    with pytest.raises(RecorderFailed, match="it ended without a word"):
+        await beginning
+
+
 async def test_of_one_that_cannot_begin_the_last_line_is_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
