@@ -210,8 +210,10 @@ def recover_file(path: Path, to: Path) -> Recovered:
     with open_file(path) as damaged, to.open("xb") as made:
         try:
             return recover(damaged, made)
-        except BaseException:
+        except BaseException as error:
             to.unlink()
+            if isinstance(error, NoRecording):
+                raise type(error)(f"{path}: {error.detail}", remedy=error.remedy) from error
             raise
 
 

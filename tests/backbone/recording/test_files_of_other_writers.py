@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
 from mcap.writer import IndexType, Writer
 
-from backbone.recording.reader import NoRecording, Recording
-from backbone.recording.recovering import Recovered, recover
+from backbone.recording.reader import NoRecording, NotOfMessages, Recording
+from backbone.recording.recovering import Recovered, recover, recover_file
 from backbone.recording.writer import ABOUT, NS, PROFILE
 
 COUNT = 50
@@ -55,3 +56,20 @@ def test_a_recording_whose_index_is_incomplete_is_refused_and_recovers_whole(opt
     recording = Recording(whole)
     assert [one.body["x"] for one in recording.messages(newest_first=True)] == [*range(COUNT)][::-1]
     assert (recording.contents().about, recording.mission_xml()) == ({"mission": "night"}, "<mission/>")
+
+
+def test_a_recording_without_checksums_is_read() -> None:
+    """A checksum of 0 means that there is none; its index was called damaged."""
+    recording = Recording(written(enable_crcs=False))
+    assert [one.body["x"] for one in recording.messages()] == [*range(COUNT)]
+
+
+def test_a_refusal_to_recover_names_the_file(tmp_path: Path) -> None:
+    foreign = tmp_path / "of another program.mcap"
+    with foreign.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="another")
+        writer.finish()
+    with pytest.raises(NotOfMessages, match=r"of another program\.mcap: the file is of profile 'ros2'"):
+        recover_file(foreign, tmp_path / "whole.mcap")
+    assert not (tmp_path / "whole.mcap").exists()
