@@ -79,10 +79,10 @@ async def export(
     """
     with opened(path) as recording:
         require_selected(recording, path, keys)
-        with new_folder(folder):
-            with closing(make_tables(folder)) as tables:
+        with new_folder(folder) as made:
+            with closing(make_tables(made)) as tables:
                 names, rows = _write_tables(recording, tables, keys)
-            videos = import_module(VIDEOS).write_videos(recording, folder, keys) if with_videos else []
+            videos = import_module(VIDEOS).write_videos(recording, made, keys) if with_videos else []
     said = f"{folder}: {counted(names, 'table')} with {counted(rows, 'row')}"
     say(f"{said}, {counted(len(videos), 'video')}" if with_videos else said)
     return ExitCode.DONE
@@ -94,8 +94,8 @@ async def export_for_lerobot(
     """Write the grants of a robot into a new folder, as episodes that LeRobot reads."""
     with opened(path) as recording:
         data_set = import_module(DATA_SETS).data_set(recording, robot, rate_hz, task, with_pictures=with_pictures)
-        with new_folder(folder):
-            said = data_set.write(folder)
+        with new_folder(folder) as made:
+            said = data_set.write(made)
     say(f"{folder}: {said}")
     return ExitCode.DONE
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,23 +42,30 @@ def new_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 @contextmanager
-def new_folder(folder: Path) -> Iterator[None]:
-    """Make a folder for the output of a command; if the block fails or is interrupted, the folder is removed.
+def new_folder(folder: Path) -> Iterator[Path]:
+    """Yield a folder for the output of a command, which gets its name when the block has ended.
+
+    If the block fails or is interrupted, the folder is removed. If the process is killed, what is left has a name that
+    ends with ``.partial``; so half an output is never taken for a whole one.
 
     Raises:
         FileUnusable: The folder exists, or a file cannot be written into it.
     """
     try:
-        folder.mkdir(parents=True)
+        if folder.exists():
+            raise FileExistsError
+        partial = folder.with_name(f"{folder.name}.{os.getpid()}.partial")
+        partial.mkdir(parents=True)
         try:
-            yield
+            yield partial
+            partial.rename(folder)
         except BaseException:
-            shutil.rmtree(folder, ignore_errors=True)
+            shutil.rmtree(partial, ignore_errors=True)
             raise
     except FileExistsError as error:
         raise FileUnusable(f"{folder} exists", remedy="Name a new folder.") from error
     except OSError as error:
-        raise unwritable(error.filename or folder, error) from error
+        raise unwritable(folder, error) from error
 
 
 def existing(path: Path) -> FileUnusable:

@@ -99,7 +99,7 @@ class _Video:
         count = int(written.get(cv2.CAP_PROP_FRAME_COUNT))
         written.release()
         if count < self._added:
-            raise NoVideo(f"{self.path} lacks pictures", remedy="Free disc space, and export again.")
+            raise NoVideo(f"{self.path.name} lacks pictures", remedy="Free disc space, and export again.")
 
 
 def _is_picture(message: Recorded) -> bool:

@@ -17,7 +17,7 @@ from mcap.writer import Writer
 from small_recordings import SCOUT, Said, recorded
 
 from backbone.command_line import comparing, event_loop, exporting, foxglove_copy, joining, recording_work, replaying
-from backbone.command_line.unusable_file import new_folder
+from backbone.command_line.unusable_file import FileUnusable, new_folder
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, show
@@ -149,10 +149,22 @@ def test_an_order_to_end_leaves_nothing_half_written(order: signal.Signals, tmp_
     try:
         with pytest.raises(KeyboardInterrupt):
             write()
-        assert not (tmp_path / "new").exists()
+        assert [*tmp_path.iterdir()] == []
         assert signal.getsignal(order) is signal.SIG_DFL
     finally:
         signal.signal(order, before)
+
+
+def test_half_an_output_is_never_taken_for_a_whole_one(tmp_path: Path) -> None:
+    """An export that was killed left a folder like a complete one, with tables that were cut."""
+    night = tmp_path / "night"
+    with new_folder(night) as made:
+        (made / "table.csv").write_text("at_s")
+        assert not night.exists()
+        assert made.name.endswith(".partial")
+    assert [one.name for one in tmp_path.rglob("*")] == ["night", "table.csv"]
+    with pytest.raises(FileUnusable, match="night exists"), new_folder(night):
+        pass
 
 
 def test_where_a_shell_ignores_ctrl_c_it_stays_ignored() -> None:
