@@ -174,6 +174,7 @@ async def test_at_a_desk_a_person_watches_drives_by_keys_and_releases(served: Se
         await page.locator("#tab-timeline").click()
         await page.wait_for_selector("svg.timeline")
         await page.wait_for_selector(".robot[data-robot=scout1] .age:has-text('ms')")
+        await page.evaluate("scrollTo(0, 0)")
         await keep_picture(page, "desktop")
         await page.keyboard.up("d")
         await wait_still(bus)
