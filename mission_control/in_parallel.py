@@ -14,7 +14,7 @@ class InParallel(Composite):
     """All children at the same time: the numbers of successes and of failures decide.
 
     Args:
-        success_count: Number of successes for a success; -1: all, -2: all but one, and so on.
+        success_count: Number of successes for a success; -1: all, -2: all but one, and so on, but at least one.
         failure_count: Number of failures for a failure; negative as above. The parent also fails as soon as too few
             children are left for a success.
         while_suspended: With FAIL, see ``Composite``. With SKIP, a child that exhausts the patience stays started, but
@@ -83,7 +83,7 @@ class InParallel(Composite):
 
     @staticmethod
     def _threshold(count: int, in_all: int) -> int:
-        return count if count >= 0 else max(in_all + count + 1, 0)
+        return count if count >= 0 else max(in_all + count + 1, min(in_all, 1))
 
     def _because(self) -> str:
         succeeded, failed = self._with_status(BehaviorStatus.SUCCESS), self._with_status(BehaviorStatus.FAILURE)

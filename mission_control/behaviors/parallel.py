@@ -14,7 +14,8 @@ class ParallelParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Parallel``.
 
     Attributes:
-        success_count: Number of children that must succeed, 1 for any; -1: all, -2: all but one, and so on.
+        success_count: Number of children that must succeed, 1 for any; -1: all, -2: all but one, and so on, but
+            at least one.
         failure_count: Number of children that must fail for a failure; negative as above.
         while_suspended: Effect of a suspended child. wait: it counts as at work. fail: after patience_s it counts as
             failed. skip: after patience_s it is not counted until it is at work again.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pytest
 from begun_children import FAIL, FAILURE, NAMES, SKIP, SUCCESS, begun, end
 
 from mission_control.children import FinishParent, StartChild, StopChild
@@ -89,3 +90,11 @@ def test_a_parallel_that_would_skip_all_waits_for_them() -> None:
     assert (rules.time_passed(2.0), rules.time_passed(3.0)) == ([], [])
     rules.suspended("b", "", 4.0)
     assert end(rules, "b", SUCCESS, 5.0)[-1] == FinishParent(SUCCESS)
+
+
+@pytest.mark.parametrize("counts", [{"success_count": -2}, {"failure_count": -2}, {"success_count": -9}])
+def test_a_parallel_that_skips_children_is_not_over_before_another_one_is(counts: dict[str, int]) -> None:
+    rules = begun(InParallel(["a", "b"], **SKIP, **counts))
+    rules.suspended("a", "slice", 0.0)
+    assert rules.time_passed(2.0) == []
+    assert end(rules, "b", SUCCESS, 3.0)[-1] == FinishParent(SUCCESS)

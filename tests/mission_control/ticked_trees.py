@@ -163,7 +163,7 @@ class TickParallel(Tick):
     def judged(self) -> BehaviorStatus:
         count = len(self.children) - len(self.skipped)
         needed, too_many = (
-            given if given >= 0 else max(count + given + 1, 0)
+            given if given >= 0 else max(count + given + 1, min(count, 1))
             for given in (self.plan.settings["success_count"], self.plan.settings["failure_count"])
         )
         found = Counter(self.results.values())
