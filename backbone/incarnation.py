@@ -7,13 +7,9 @@ the same pids.
 from __future__ import annotations
 
 import os
-from typing import Annotated, NamedTuple
-
-from msgspec import Meta
+from typing import NamedTuple
 
 START_BYTES = 6  # chosen: two of a million lives are equal by a chance of 1 in 500; JavaScript keeps it exact
-
-Start = Annotated[int, Meta(ge=0, lt=2 ** (8 * START_BYTES))]
 
 
 class Incarnation(NamedTuple):

@@ -27,6 +27,7 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
+from backbone.incarnation import START_BYTES
 from backbone.naming import MAX_NAME_LENGTH
 from backbone.type_aliases import unaliased
 
@@ -86,6 +87,8 @@ Number = Annotated[int, Meta(ge=-EXACT, le=EXACT)]
 """Any integer, such as a seed."""
 Version = Annotated[int, Meta(ge=0, le=1_000_000)]  # chosen: a version grows by one with a release
 Pid = Annotated[int, Meta(ge=0, le=2**22)]  # Linux, PID_MAX_LIMIT; 0: none
+Start = Annotated[int, Meta(ge=0, lt=2 ** (8 * START_BYTES))]
+"""Random number of a component's life; 0: not known."""
 ExitCode = Annotated[int, Meta(ge=-255, le=255)]  # POSIX: a byte; Python: minus the signal
 Signal = Annotated[int, Meta(ge=1, le=64)]  # Linux, the real-time signals included
 Priority = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]  # the mission file's xs:int

@@ -7,8 +7,22 @@ from typing import Annotated, Any
 
 from backbone.component.log_level import LogLevel as LogLevel  # noqa: PLC0414  a part of these messages
 from backbone.errors import Refusal
-from backbone.incarnation import Incarnation, Start
-from backbone.ranges import FEW, MANY, Address, Count, Instant, MachineTime, Measure, Mention, Pid, Rate, Text, Values
+from backbone.incarnation import Incarnation
+from backbone.ranges import (
+    FEW,
+    MANY,
+    Address,
+    Count,
+    Instant,
+    MachineTime,
+    Measure,
+    Mention,
+    Pid,
+    Rate,
+    Start,
+    Text,
+    Values,
+)
 from backbone.wire import Message
 
 MESSAGES_DROPPED, DEADLINES_MISSED = "dropped ", "deadlines missed "

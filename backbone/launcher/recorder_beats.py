@@ -15,10 +15,10 @@ from pathlib import Path
 import msgspec
 
 from backbone.bus.interface import Bus
-from backbone.incarnation import Incarnation, Start, random_start
+from backbone.incarnation import Incarnation, random_start
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address, claim_address
-from backbone.ranges import Line, Mention, Pid
+from backbone.ranges import Line, Mention, Pid, Start
 from backbone.wire import Message
 
 NAME_BEGIN = "recorder-"
