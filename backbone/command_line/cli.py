@@ -369,7 +369,7 @@ def simulate(
 @app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
 def experiment(context: typer.Context) -> None:
     """Run experiments on simulated robots, among them those of the papers; see 'experiment --help'."""
-    import_module(EXPERIMENTS).run(context.args)
+    raise typer.Exit(import_module(EXPERIMENTS).run(context.args))
 
 
 def _width() -> int | None:

@@ -15,9 +15,11 @@ _OWN_WORDS = (
     (r"Invalid value: (?P<why>.*)", r"\g<why>"),
     (r"Missing (?:argument|option) '?(?P<name>[^']+?)'?\.", r"\g<name> is missing"),
     (
-        r"No such (?P<what>option|command):? '?(?P<name>[^' ]+?)'?\.?(?P<near> \(.*\))?",
-        r"there is no \g<what> \g<name>",
+        r"No such (?P<what>option|command):? '?(?P<name>[^' ]+?)'?\.? "
+        r"(?:\(Possible options: (?P<options>.*)\)|Did you mean (?P<near>.*)\?)",
+        r"there is no \g<what> \g<name> (did you mean \g<options>\g<near>?)",
     ),
+    (r"No such (?P<what>option|command):? '?(?P<name>[^' ]+?)'?\.?", r"there is no \g<what> \g<name>"),
     (r"Got unexpected extra arguments?(?:\(s\))? \((?P<words>.*)\)", r"too many arguments: \g<words>"),
     (r"Option '(?P<name>[^']+)' requires .*", r"\g<name> needs a value"),
 )

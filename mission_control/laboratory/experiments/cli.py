@@ -165,9 +165,9 @@ def servoing(
         Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(servo_table(outcome))
 
 
-def run(arguments: list[str]) -> None:
-    """Run ``scout-backbone experiment`` with these arguments."""
-    app(arguments, prog_name="scout-backbone experiment")
+def run(arguments: list[str]) -> int:
+    """Run ``scout-backbone experiment`` with these arguments; return the exit code."""
+    return app(arguments, prog_name="scout-backbone experiment", standalone_mode=False) or 0
 
 
 def _run(

@@ -37,6 +37,9 @@ def complaint_of(
         ("watch --most ٢", "--most: ٢ is no number; write it in digits 0 to 9 (See 'scout-backbone watch --help'.)"),
         ("recording info", "FILE.mcap is missing (See 'scout-backbone recording info --help'.)"),
         ("recording info a b", "too many arguments: b (See 'scout-backbone recording info --help'.)"),
+        ("statu", "there is no command statu (did you mean 'status', 'start'?) (See 'scout-backbone --help'.)"),
+        ("top --jso", "there is no option --jso (did you mean --for, --json?) (See 'scout-backbone top --help'.)"),
+        ("experiment bogus", "there is no command bogus (See 'scout-backbone experiment --help'.)"),
         ("recording bogus", "there is no command bogus (See 'scout-backbone recording --help'.)"),
         ("top --bogus", "there is no option --bogus (See 'scout-backbone top --help'.)"),
         (
