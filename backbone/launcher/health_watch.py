@@ -46,8 +46,11 @@ class HealthWatch:
         self._said_s = 0.0
 
     def absences(self) -> list[Absence]:
-        """Return the absences that the watch found; other owners report theirs in their own states."""
-        return list(self.picture.missed)
+        """Return the absences that the watch found; other owners report theirs in their own states.
+
+        The mission's start is none of them: the launcher knows when it is over, before the nameserver's list says so.
+        """
+        return [absence for absence in self.picture.missed if not absence.is_start]
 
     def notice(self) -> None:
         """Examine and publish soon, because something has changed."""
@@ -114,7 +117,7 @@ class HealthWatch:
     def _health(self) -> MissionHealth:
         # The launcher's own state in the list is one round old: its absences may have ended.
         others = {at: state for at, state in self._components.items() if at != self._bus.source}
-        missed = [*self._own(), *self.picture.missed]
+        missed = [*self._own(), *self.absences()]
         return health(others, missed, self._clock.now_s(), self._clock.rate)
 
     def _due_in_s(self) -> float:

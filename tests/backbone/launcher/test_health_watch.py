@@ -114,6 +114,17 @@ def test_the_health_is_heard_every_second_also_when_it_was_said_in_between() -> 
     run_virtual(main())
 
 
+def test_a_launcher_that_has_started_all_does_not_say_starting_because_of_an_old_list() -> None:
+    async def main() -> None:
+        async with watched() as services:
+            services.said.clear()
+            services.state = ComponentState(LAUNCHER, "launcher", "base", 7, LifeState.CONNECTING, 0.0)
+            await services.clock.sleep_s(20.0)
+            assert {health.word for _, health in services.said} == {HealthWord.OK}
+
+    run_virtual(main())
+
+
 def test_an_absence_that_an_owner_reports_is_said_at_once_and_so_is_its_end() -> None:
     async def main() -> None:
         async with watched() as services:
