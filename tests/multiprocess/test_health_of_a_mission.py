@@ -15,7 +15,7 @@ import pytest
 from running_mission import RunningMission, mission_up
 
 from backbone.addresses import LAUNCHER
-from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.component.messages import AskState, ComponentState, LifeState, StoryEvent
 from backbone.keys import Conversation
 from backbone.picture.health import MissionHealth
 from backbone.wire import Envelope
@@ -128,9 +128,9 @@ def test_a_stranger_on_the_bus_writes_no_escape_to_any_terminal(mission: Running
             for at in ("ui_console/tester", "resource_pool/scout1"):
                 bus.publish(at, Conversation.LOG, StoryEvent(1.0, at, hostile, hostile, hostile))
             scout = next(c for c in mission.status()["components"] if c["name"] == "scout3")  # no ARC holds it
-            state = ComponentState(
-                "resource_pool/scout3", "scout", scout["host"], scout["pid"], LifeState.READY, 1.0, hostile
-            )
+            at = "resource_pool/scout3"
+            known = (await bus.ask(at, AskState(), ComponentState, within_s=2)).start
+            state = ComponentState(at, "scout", scout["host"], scout["pid"], LifeState.READY, 1.0, hostile, start=known)
             bus.publish("resource_pool/scout3", Conversation.STATUS, state)
             await asyncio.sleep(0.5)
 
