@@ -176,6 +176,6 @@ def _answer(what: str, about: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    faulthandler.dump_traceback_later(float(sys.argv[2]))  # so that a class that hangs is told with its place
+    faulthandler.dump_traceback_later(float(sys.argv[2]))  # the asking process prints the line at which the class hangs
     _answer(sys.argv[1], sys.stdin.buffer.read().decode().split("\0"))
     os._exit(0)  # a thread that a module started at its import may never end

@@ -36,7 +36,7 @@ ONE_KEY = re.compile(rf"([^\x1b]|{CSI}[@-~]|\x1bO.|\x1b.)\1*", re.DOTALL)
 class KeyStream(XTermParser):
     """Input of one terminal.
 
-    Law: x or X that arrives alone is a key, whatever arrived before; so is any other key that does after a pause.
+    Law: a read of x or X alone is a key, whatever came before. So is a read of any other key alone after a pause.
     """
 
     def __init__(self) -> None:

@@ -6,15 +6,35 @@ import re
 import sys
 import tomllib
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 
 from ui_console.model.key_view import KeyView
-from ui_console.model.message_views import GROUP, VIEWS, FieldRow, MessageView, installed_views
+from ui_console.model.message_views import GROUP, VIEWS, FieldRow, MessageView, Views, installed_views
 
 PAGE = Path(__file__).parents[3] / "docs/how-to/show-a-message-otherwise.md"
+
+
+def install(folder: Path, name: str, entry_points: str) -> None:
+    """Write what pip leaves of an installed package."""
+    about = folder / f"{name}-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(f"[{GROUP}]\n{entry_points}\n")
+
+
+def views_with(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Views:
+    """Return the views that are installed with the packages in this folder; their modules are forgotten again."""
+    monkeypatch.syspath_prepend(folder)
+    installed_views.cache_clear()
+    try:
+        return installed_views()
+    finally:
+        installed_views.cache_clear()
+        own = [name for name, module in sys.modules.items() if str(folder) in str(getattr(module, "__file__", ""))]
+        for name in own:
+            del sys.modules[name]
 
 
 def test_the_example_shows_its_message_once_its_package_is_installed(
@@ -23,21 +43,11 @@ def test_the_example_shows_its_message_once_its_package_is_installed(
     blocks = dict(re.findall(r"```(python|toml)\n(.*?)```", PAGE.read_text(), re.DOTALL))
     views = tomllib.loads(blocks["toml"])["project"]["entry-points"][GROUP]
     (name, target), *_ = views.items()
-    about = tmp_path / "arms-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: arms\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text(f"[{GROUP}]\n{name} = {target}\nmissing = arms.nothing:VIEWS\n")
+    install(tmp_path, "arms", f"{name} = {target}\nmissing = arms.nothing:VIEWS")
     (tmp_path / "arms").mkdir()
     (tmp_path / "arms/__init__.py").write_text("")
     (tmp_path / "arms/views.py").write_text(blocks["python"])
-    monkeypatch.syspath_prepend(tmp_path)
-    installed_views.cache_clear()
-    try:
-        found = installed_views()
-    finally:
-        installed_views.cache_clear()
-        for module in [one for one in sys.modules if one.partition(".")[0] == "arms"]:
-            assert isinstance(sys.modules.pop(module), ModuleType)
+    found = views_with(tmp_path, monkeypatch)
     assert {"ArmTurned/1", "Frame/1"} <= found.keys(), "those of other packages stay"
     view = KeyView("ArmTurned/1", found)
     view.take({"turn_rad": 1.5707963267948966, "grip": "open"}, 1.0, 1)
@@ -63,18 +73,9 @@ def test_the_example_shows_its_message_once_its_package_is_installed(
 def test_a_package_with_a_fault_in_its_views_is_left_out_and_named(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    about = tmp_path / "faulty-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text(f"[{GROUP}]\nfaulty = faulty_views:VIEWS\n")
+    install(tmp_path, "faulty", "faulty = faulty_views:VIEWS")
     (tmp_path / "faulty_views.py").write_text(text)
-    monkeypatch.syspath_prepend(tmp_path)
-    installed_views.cache_clear()
-    try:
-        assert VIEWS.items() <= installed_views().items()
-    finally:
-        installed_views.cache_clear()
-        sys.modules.pop("faulty_views", None)
+    assert VIEWS.items() <= views_with(tmp_path, monkeypatch).items()
     assert "the views of faulty are left out" in caplog.text
 
 
@@ -84,19 +85,9 @@ def test_of_two_packages_with_a_view_of_one_schema_the_first_counts_and_the_othe
     """Which of them was shown depended on the order of folders, and nothing named the other."""
     one = "from ui_console.model.message_views import MessageView\nclass Own(MessageView): ...\n"
     for name in ("zebra", "ant"):
-        about = tmp_path / f"{name}-1.0.dist-info"
-        about.mkdir()
-        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-        (about / "entry_points.txt").write_text(f"[{GROUP}]\n{name} = {name}_views:VIEWS\n")
+        install(tmp_path, name, f"{name} = {name}_views:VIEWS")
         (tmp_path / f"{name}_views.py").write_text(f"{one}VIEWS = {{'Turned/1': Own, 'Frame/1': Own}}")
-    monkeypatch.syspath_prepend(tmp_path)
-    installed_views.cache_clear()
-    try:
-        found = installed_views()
-    finally:
-        installed_views.cache_clear()
-        for name in ("zebra", "ant"):
-            sys.modules.pop(f"{name}_views", None)
+    found = views_with(tmp_path, monkeypatch)
     assert {found[schema].__module__ for schema in ("Turned/1", "Frame/1")} == {"ant_views"}
     assert "zebra has a view of Turned/1, too; that of ant is shown" in caplog.text
 

@@ -1,4 +1,4 @@
-"""A terminal that is very small ends no console, whatever is on its screen; one that is very large holds up no key."""
+"""A console goes on in a very small terminal, and answers keys at once in a very large one."""
 
 from __future__ import annotations
 
