@@ -40,6 +40,23 @@ PRESS_AFTER_DRAG = """(handle) => {
 }"""
 """All in one task of the page, as on a busy device: no timer is served between the drag and the press."""
 
+SHOWN_AGAIN = """async (dialog) => {
+  const dialogs = await import("./design_dialogs.js");
+  const options = [{ label: "a", doc: "" }];
+  const show = () => (dialog === "ask" ? dialogs.ask("Ask", "", []) : dialogs.choose("Choose", options));
+  const isOpen = [];
+  let answered = show();
+  for (let times = 0; times < 2; times += 1) {
+    if (dialog === "ask") document.getElementById("ask-form").requestSubmit();
+    else document.querySelector("#choose-list button").click();
+    await answered;
+    answered = show();
+    await new Promise((resolve) => setTimeout(resolve, 100));
+    isOpen.push(document.getElementById(dialog).open);
+  }
+  return isOpen;
+}"""
+
 
 @asynccontextmanager
 async def page_at(size: str, address: str, theme: str = "dark") -> AsyncIterator[Any]:
@@ -273,6 +290,16 @@ async def test_a_dialog_asks_for_what_is_required_and_keeps_answers_that_were_re
             await page.locator("#ask [name=priority]").fill("7")
             await page.keyboard.press("Enter")
             await Hands(page).see("behavior rounds patrol priority 7")
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("dialog", ["ask", "choose"])
+async def test_a_dialog_shown_again_at_once_stays_open(tmp_path: Path, dialog: str) -> None:
+    """The browser tells of the first one's end when the second is shown already."""
+    with served(tmp_path / "guard.xml") as address:
+        async with page_at("desktop", address) as page:
+            is_open = await page.evaluate(SHOWN_AGAIN, dialog)
+    assert is_open == [True, True]
 
 
 @pytest.mark.thorough

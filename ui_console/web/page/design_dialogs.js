@@ -35,7 +35,9 @@ export function ask(title, doc, asks, refused = "") {
       close(fields.map((one) => one.input.value));
     };
     cancel.onclick = () => close(null);
-    dialog.onclose = () => close(null);
+    dialog.onclose = () => {
+      if (!dialog.open) close(null); // else the event is late: the dialog was shown again meanwhile
+    };
     dialog.showModal();
     (first ?? find("ask-done")).focus();
     if (first instanceof HTMLInputElement) first.select();
@@ -73,7 +75,9 @@ export function choose(title, options) {
       event.preventDefault();
       query(list, "button", HTMLButtonElement)?.click();
     };
-    dialog.onclose = () => close(null);
+    dialog.onclose = () => {
+      if (!dialog.open) close(null); // else the event is late: the dialog was shown again meanwhile
+    };
     fill();
     dialog.showModal();
     filter.focus();
