@@ -20,6 +20,7 @@ from backbone.keys import Conversation
 from backbone.mission.reader import read_mission
 from backbone.wire import Envelope
 from mission_control.messages import MotionSeen
+from mission_control.vision.motion_detection import LEAST_DIFFERENCE, SLOW_WEIGHT
 from resource_pool.drivers.world_messages import WorldState
 from resource_pool.localization import AskPose, Pose
 from resource_pool.messages import Frame
@@ -30,7 +31,8 @@ from scout_model.targets import where
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
 
 BEGIN = 'begin-s="5"'
-AFTERIMAGE_S = 1.5  # the running average needs so long to forget at 15 pictures a second
+FORGOTTEN_AFTER = math.ceil(math.log(LEAST_DIFFERENCE / 255) / math.log(1 - SLOW_WEIGHT))  # pictures, white on black
+STEP_S = 0.05
 STANDS_M = 1e-6
 SETTLED_S = 20.0
 FIRST_EVENT_WITHIN_S = 90.0  # a round of the target takes 52 s
@@ -42,19 +44,31 @@ class Seen:
 
     Attributes:
         events: Motion events, in order.
-        robots: Robots named by delivered pictures; empty text for garbage.
+        pictures: Delivered pictures, as mission time of the capture and robot; empty text for garbage.
         world_began_s: Mission time at the world's time 0.
         first: Set with the first motion event.
     """
 
     events: list[MotionSeen] = field(default_factory=list)
-    robots: list[str] = field(default_factory=list)
+    pictures: list[tuple[float, str]] = field(default_factory=list)
     world_began_s: float = math.nan
     first: asyncio.Event = field(default_factory=asyncio.Event)
+
+    @property
+    def robots(self) -> set[str]:
+        return {robot for _captured_s, robot in self.pictures}
 
     def motion(self, heard: Envelope[Any]) -> None:
         self.events.append(heard.body)
         self.first.set()
+
+    def picture(self, heard: Envelope[Any]) -> None:
+        self.pictures.append((heard.body.captured_s, heard.body.robot))
+
+    def remembers_since_s(self, event: MotionSeen) -> float:
+        """Return the mission time of the oldest picture that the running average had not forgotten at the event."""
+        earlier = [at_s for at_s, robot in self.pictures if robot == event.robot and at_s <= event.at_s]
+        return min(sorted(earlier)[-FORGOTTEN_AFTER:], default=event.at_s)
 
 
 @asynccontextmanager
@@ -66,7 +80,7 @@ async def observed(mission: RunningMission) -> AsyncIterator[tuple[Bus, Seen]]:
 
     async with mission.bus() as bus:
         bus.subscribe("mission_control/*", Conversation.EVENTS, MotionSeen, seen.motion)
-        bus.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda heard: seen.robots.append(heard.body.robot))
+        bus.subscribe("resource_pool/*", Conversation.FRAMES, Frame, seen.picture)
         bus.subscribe("resource_pool/world", Conversation.BODIES, WorldState, world_moved, latest=True)
         yield bus, seen
 
@@ -86,17 +100,18 @@ def is_in_view(scout: RobotPlace, target: Target, world_s: float) -> bool:
 
 
 def judge(seen: Seen, world: WorldDescription) -> None:
-    """Each event has a target that moves in view, or did so a moment ago; no garbage was delivered."""
+    """Each event shows a target that moves in view, or did in a picture not yet forgotten; no garbage was delivered."""
     scouts, [target] = {scout.name: scout for scout in world.robots}, world.targets
     for event in seen.events:
-        moments = [event.at_s - seen.world_began_s - back * 0.05 for back in range(int(AFTERIMAGE_S / 0.05))]
+        steps = math.ceil((event.at_s - seen.remembers_since_s(event)) / STEP_S) + 1
+        moments = [event.at_s - seen.world_began_s - step * STEP_S for step in range(steps)]
         assert any(
             is_in_view(scouts[event.robot], target, at_s)
             and math.dist(position(target, at_s), position(target, at_s - 0.1)) > STANDS_M
             for at_s in moments
         ), f"nothing moved in view of {event.robot} at {event}"
     assert seen.robots, "no picture was delivered"
-    assert set(seen.robots) <= set(scouts), "a picture of no robot, or of several"
+    assert seen.robots <= set(scouts), "a picture of no robot, or of several"
 
 
 def position(target: Target, at_s: float) -> tuple[float, float]:
@@ -145,7 +160,7 @@ async def test_nothing_is_seen_while_the_target_stands_in_the_doorway() -> None:
             await asyncio.sleep(7.0)
             await no_garbage(bus)
     assert seen.robots
-    assert {"scout1", "scout2"} == set(seen.robots)
+    assert seen.robots == {"scout1", "scout2"}
     assert not seen.events
 
 
