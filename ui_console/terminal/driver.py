@@ -8,6 +8,7 @@ from __future__ import annotations
 import atexit
 import os
 import selectors
+import signal
 import time
 from codecs import getincrementaldecoder
 from collections.abc import Iterable
@@ -44,6 +45,9 @@ class TerminalDriver(LinuxDriver):
         self, app: App[object], *, debug: bool = False, mouse: bool = True, size: tuple[int, int] | None = None
     ) -> None:
         super().__init__(app, debug=debug, mouse=mouse, size=size)
+        # The system may give SIGCONT to any thread; with a handler of the loop, it ends the loop's wait.
+        self._loop.add_signal_handler(signal.SIGCONT, lambda: None)
+        signal.signal(signal.SIGCONT, self._sigcont_application)
         self._gate = KeyGate()
         self._output = TerminalOutput(STANDARD_OUTPUT, self._draw_anew)
         atexit.register(self._output.wait_written, ENDS_WITHIN_S[1])
@@ -61,9 +65,12 @@ class TerminalDriver(LinuxDriver):
         if self._is_drawing:
             self._must_signal_resume = True
             self.suspend_application_mode()
+        is_resumed = self._must_signal_resume
         self._output.drops = False
         super().start_application_mode()  # type: ignore[no-untyped-call]  # Textual declares no types here
         self._output.drops = self._is_drawing = True
+        if is_resumed:
+            self._draw_anew()  # the terminal's second screen is empty now
 
     def stop_application_mode(self) -> None:
         """Stop drawing and reading, and restore the terminal."""

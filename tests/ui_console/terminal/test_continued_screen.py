@@ -43,6 +43,19 @@ TerminalDriver.run_input_thread = lambda self: (time.sleep(0.3), read(self))
 """
 
 
+CONTINUED_IN_A_THREAD = """
+import signal, threading
+
+def take():
+    signal.sigwait([signal.SIGUSR1])
+    signal.pthread_kill(threading.get_ident(), signal.SIGCONT)
+
+signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+threading.Thread(target=take, daemon=True).start()
+"""
+QUIET_S = 0.5  # the event loop waits then
+
+
 @pytest.mark.parametrize("before", ["", READS_LATE], ids=["", "before it reads"])
 @pytest.mark.parametrize("stop", rest_thorough([signal.SIGSTOP, signal.SIGTSTP]))
 def test_a_screen_that_was_stopped_and_continued_reads_keys_and_ends(stop: signal.Signals, before: str) -> None:
@@ -57,6 +70,16 @@ def test_a_screen_that_was_stopped_and_continued_reads_keys_and_ends(stop: signa
         played.type(b"q")
         played.wait_shown(b"\x1b[?1049l")  # the terminal's first screen
         assert played.screen.wait(WITHIN_S) == 0
+
+
+@pytest.mark.parametrize("continued_by", [signal.SIGCONT, signal.SIGUSR1], ids=["", "in another thread"])
+def test_a_screen_in_which_nothing_changes_is_drawn_again(continued_by: signal.Signals) -> None:
+    with screen_on_a_terminal(CONTINUED_IN_A_THREAD + PROGRAM) as played:
+        played.wait_shown(b"BEGUN")
+        while select.select([played.terminal], [], [], QUIET_S)[0]:
+            os.read(played.terminal, 1 << 16)
+        played.screen.send_signal(continued_by)
+        played.wait_shown(b"BEGUN")
 
 
 @pytest.mark.parametrize("stop", rest_thorough([signal.SIGTSTP, signal.SIGSTOP]))
