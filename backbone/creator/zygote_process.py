@@ -185,6 +185,7 @@ class _ZygoteProcess:
         if os.getsid(0) != self._own_pid:
             os.setsid()  # Ctrl-C at a terminal is for the launcher, which then ends the zygote
         own_process.adopt_orphans()
+        own_process.allow_many_files()
         own_process.set_title(process_table.zygote_title(self._settings.parent))
         self._signals.setblocking(False)
         self._signals_in.setblocking(False)

@@ -1,9 +1,10 @@
-"""Settings of the calling process in the kernel: its title, its parent's death, orphans."""
+"""Settings of the calling process in the kernel: its title, its parent's death, orphans, its limit of open files."""
 
 from __future__ import annotations
 
 import ctypes
 import os
+import resource
 import signal
 from contextlib import suppress
 
@@ -26,6 +27,16 @@ def adopt_orphans() -> None:
 def set_title(title: str) -> None:
     """Set the name of this process in ``ps`` and ``top``, cut to 15 characters."""
     _prctl(_PR_SET_NAME, ctypes.create_string_buffer(title[:_LONGEST_TITLE].encode()))
+
+
+def allow_many_files() -> None:
+    """Raise the limit of open files of this process and its later children to what the system allows them.
+
+    The usual limit of 1024 is meant for programs that call ``select``; a hub has four files or more for each process.
+    """
+    _now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(OSError, ValueError):  # the limit of the whole system was lowered meanwhile
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def go_behind_others() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import resource
 from pathlib import Path
 
 import msgspec
@@ -30,6 +31,13 @@ Path(__file__).with_suffix(".json").write_text(json.dumps(found))
 """
 
 
+LIMITS = """
+import json, resource
+from pathlib import Path
+Path(__file__).with_suffix(".json").write_text(json.dumps(resource.getrlimit(resource.RLIMIT_NOFILE)))
+"""
+
+
 async def test_what_fails_or_starts_threads_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, text in {**MODULES, "probe": PROBE % list(MODULES)}.items():
         (tmp_path / f"{name}.py").write_text(text)
@@ -52,6 +60,21 @@ async def test_what_fails_or_starts_threads_is_left_out(tmp_path: Path, monkeypa
     }
     assert "arc_with_a_bug is not preloaded" in told
     assert "arc_with_a_thread starts threads" in told
+
+
+async def test_components_may_open_as_many_files_as_the_system_allows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "limits.py").write_text(LIMITS)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    usual, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (usual - 1, most))
+    try:
+        zygote = await Zygote.spawn_fresh(run_directory=str(tmp_path / "run"), preload=("limits",))
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (usual, most))
+    await zygote.close()
+    assert json.loads((tmp_path / "limits.json").read_text()) == [most, most]
 
 
 async def test_a_launch_that_cannot_be_sent_is_refused_and_moves_no_other_answer(tmp_path: Path) -> None:
