@@ -28,7 +28,7 @@ from backbone.import_faults import import_fault
 from backbone.ranges import Share
 
 Options = TypeVar("Options", bound=msgspec.Struct)
-OPENS_WITHIN_S = 60.0  # chosen: three times as long as a world may take to answer; machine seconds
+OPENS_WITHIN_S = 60.0  # chosen: longer than a world may take to answer; machine seconds
 
 
 class UnknownDriver(Refusal):

@@ -23,7 +23,7 @@ from scout_model.scout import clip_wheel_speed
 
 REPLY_EVERY_S = 0.5  # chosen: a person reads a gauge no faster; mission seconds, machine seconds if the clock is faster
 FIRST_REPLY_BITS = radio_link.packet_bits(bytes(4))  # chosen: a Scout's; later the last reply's length is known
-WORLD_START_S = 20.0  # chosen: the world compiles its model before it answers
+WORLD_START_S = 50.0  # chosen: 250 Scouts beside other work took over 20; less than an RC waits for its driver
 
 
 async def meet_world(site: DriverSite) -> WorldModel:
@@ -37,7 +37,10 @@ async def meet_world(site: DriverSite) -> WorldModel:
             site.bus, site.clock, world_of(site), AskWorld(), WorldModel, each_s=2.0, within_s=WORLD_START_S
         )
     except LinkError as error:
-        raise HardwareFault(f"{site.resource}: no simulated world {site.parameters.world!r}: {error}") from error
+        raise HardwareFault(
+            f"{site.resource}: no simulated world {site.parameters.world!r}: {error}",
+            remedy="See the state of the world with 'scout-backbone status'; a large one on a busy host takes long.",
+        ) from error
 
 
 def world_of(site: DriverSite) -> str:
