@@ -22,6 +22,9 @@ class ArcSwitches:
         failures: Gets the ARCs that do not open their gates.
         rcs: Gets the names of RCs that failed.
         grace_s: Time that an ARC has to stop cleanly.
+
+    Attributes:
+        failed_again: ARCs whose last two or more connections failed because they did not open their gates.
     """
 
     def __init__(
@@ -31,6 +34,7 @@ class ArcSwitches:
         self._rcs, self._grace_s = rcs, grace_s
         self._under_way: dict[str, asyncio.Task[None]] = {}
         self._in_vain: dict[str, tuple[str, ...]] = {}
+        self.failed_again: set[str] = set()
         self._times = SwitchTimes()
 
     def __contains__(self, arc: str) -> bool:
@@ -52,6 +56,7 @@ class ArcSwitches:
 
     def forget(self, arc: str) -> None:
         """Forget why the ARC did not open its gate, because it did so now or has ended."""
+        self.failed_again.discard(arc)
         self._rcs.forget_hosts(self._in_vain.pop(arc, ())[:1])
 
     def connect(self, order: ConnectArc) -> None:
@@ -89,6 +94,8 @@ class ArcSwitches:
             self._rcs.failed(vain.failed)
         else:
             self._failures.begin(order.arc)
+            if order.arc in self._in_vain:
+                self.failed_again.add(order.arc)
             self._in_vain[order.arc] = (order.arc, *order.epochs)
             self._rcs.measure_hosts(self._in_vain[order.arc])
         for rc in vain.unconfirmed:

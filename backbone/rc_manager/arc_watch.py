@@ -131,14 +131,17 @@ class ArcWatch:
         return [*dict.fromkeys([*self._beats.heard_s, *self._requesting])]
 
     def absences(self, answers: Answers) -> list[Absence]:
-        """Return the ARCs that want time, and cannot be served or did not open their gates when last connected."""
+        """Return the ARCs that want time, and cannot be served or did not open their gates when last connected.
+
+        An ARC that waits for others is among them only if it failed repeatedly: after one failure it lacks only time,
+        and the cause may be over long before its next connection.
+        """
         never = [
             Absence(arc, since_s, why, f"waits until {until}", is_running=True)
             for arc, since_s, why, until in answers.unservable()
         ]
-        return never + self._failures.absences(
-            answers.wanting(), "the RC manager connects it again", self._switches.remedy
-        )
+        named = answers.wanting() - (answers.waiting() - self._switches.failed_again - self._failures.repeated())
+        return never + self._failures.absences(named, "the RC manager connects it again", self._switches.remedy)
 
     def remember(self, arc: str) -> None:
         """Know the ARC from now on: it asks for RCs."""

@@ -104,6 +104,10 @@ class Answers:
         arcs = self._state.arcs.values()
         return {arc.name for arc in arcs if arc.state is not RequestState.IDLE or arc.retry_s is not None}
 
+    def waiting(self) -> set[str]:
+        """Return the ARCs that wait for others, or for RCs."""
+        return {arc.name for arc in self._state.arcs.values() if arc.state is RequestState.WAITING}
+
     def attributes(self, name: str) -> Attributes:
         """Return the requests of an ARC, of an owner (name or address), or of a node and its descendants.
 

@@ -19,6 +19,7 @@ from backbone.placer.messages import Start, Started
 from backbone.rc_manager.failures import WORKS_AGAIN_S
 from backbone.rc_manager.messages import AskRc, Connect, Disconnect, RcState
 from backbone.rc_manager.rc_watch import MEET_LATEST_S
+from backbone.scheduling.arc_events import RETRY_S
 from backbone.scheduling.requests import LEASE_S
 from backbone.wire import Envelope, Message
 
@@ -169,6 +170,25 @@ def test_an_arc_that_opens_in_vain_is_named_while_it_wants_time(pool: Any) -> No
             await here.clock.sleep_s(20.0)
             assert odd.is_open
             assert not await _absent(odd)
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("in_vain", [1, 2])
+def test_an_arc_that_waits_for_others_is_named_only_if_it_failed_repeatedly(pool: Any, in_vain: int) -> None:
+    """After a cut link one ARC's gate stayed shut once; it waited for a higher one, and health stayed degraded."""
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            odd, higher = await here.arc("odd"), await here.arc("higher")
+            odd.cannot_open = NotReady("odd could not be prepared: no picture")
+            await odd.ask_for(request("odd", "left"))
+            await here.clock.sleep_s(0.5 + (in_vain - 1) * RETRY_S)
+            assert "odd" in await _absent(odd)
+            await higher.ask_for(request("higher", "left", priority=100))
+            await here.clock.sleep_s(20.0)
+            assert higher.is_open
+            assert ("odd" in await _absent(odd)) is (in_vain > 1)
 
     run_virtual(main())
 

@@ -128,6 +128,10 @@ SUPERVISED: dict[str, tuple[int, list[SupervisionFault]]] = {
         1,
         [Cut(3.1, "h2", 8.0), End(6.0, "tree1-leaf1", "killed")],
     ),
+    "an ARC whose gate stayed shut once is not named while it waits for others": (
+        7700180,
+        [Cut(3.257729, "h2", 25.930718), End(4.776615, "placer", "politely")],
+    ),
 }
 
 
