@@ -44,16 +44,22 @@ class Blockers:
         In a large group: the ARCs that block it and those first in line before it.
         """
         arc, planner = slot.arc, self._schedule.planner_of(slot.arc)
+        if held_back_by := self.held_back_by(arc):
+            return held_back_by
         met = [*dict.fromkeys(other for other, _, _ in meeting(slot.against, now_s, now_s + arc.length_s))]
         if not self._in_turns:
             met += [one for one in self._holders_in_the_way(arc, now_s) if one.state in CONNECTED and one not in met]
         met += [first for first in planner.firsts_before(arc) if first not in met]
         alone = [other for other in met if not self._table.fits(arc, [other])]
-        if not met and self._table.strict:
-            return [*itertools.islice(self._higher_ones(arc), 1)]
         if not met and not planner.is_exact:
             return planner.before(arc)[:1]
         return alone or met
+
+    def held_back_by(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return the first higher ARC that waits, if nothing but the policy ``strict`` keeps this one from its RCs."""
+        if not self._table.strict or not self._table.fits(arc, self._table.holders(arc)):
+            return []
+        return [*itertools.islice(self._higher_ones(arc), 1)]
 
     def altogether(self, arc: ArcEntry, now_s: float, *, grace_s: float) -> list[ArcEntry]:
         """Return a set of ARCs without which this one starts as soon as its RCs are free; small, not always smallest.

@@ -283,8 +283,7 @@ class Explanation:
         if not blockers:
             return _Answer([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
         whom = _names(blockers)
-        fits_now = slot.start_s <= now_s + INSTANT_S
-        if self._table.strict and fits_now and all(o.queued and higher(o.path, arc.path) for o in blockers):
+        if self._blockers.held_back_by(arc):
             what = f"{age}: none starts while {whom}, higher in its group, waits (policy strict)"
             return _Answer([what], "8", f"{whom} starts or idles")
         if granted_s == math.inf:

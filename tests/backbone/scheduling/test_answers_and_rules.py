@@ -3,9 +3,10 @@
 from random import Random
 
 import pytest
-from simulated_switches import Bench, ask, manager, sharable, states, unit
+from simulated_switches import Bench, ask, load, manager, sharable, states, unit
 
 from backbone.scheduling.events import (
+    Departed,
     PriorityChanged,
 )
 from backbone.scheduling.requests import (
@@ -50,6 +51,26 @@ def test_why_names_the_blocker_its_rank_and_the_end_of_its_slice():
     assert (why.state, why.rule, why.blockers, why.expected_start_s) == ("waiting", "3", ["a"], 5.0)
     assert "a (equal, shares v) runs, its slice ends at 5.00 s" in why.lines
     assert "a" in why.would_change
+
+
+def test_why_names_the_higher_one_for_which_strict_holds_a_free_rc():
+    """Its RCs are free beside the one that runs; ``why`` named that one, and spoke of a gap that is too short."""
+    radio = {"radio": load(0.1)}
+    bench = Bench(manager(policy="strict"), unit("s1"), unit("s2"), sharable("radio"))
+    bench.tell(ask("top", {"s1": RcUse(), **radio}, priority=3))
+    bench.tell(ask("middle", {"s1": RcUse(), **radio}, priority=2))
+    for low in ("low", "later"):
+        bench.tell(ask(low, {"s2": RcUse(), **radio}, priority=1))
+    bench.run(20.0)
+    assert states(bench) == {"top": "running", "middle": "waiting", "low": "waiting", "later": "waiting"}
+    for name in ("low", "later"):
+        why = bench.answers.why(name, 20.0)
+        assert "none starts while middle, higher in its group, waits (policy strict)" in why.lines[0]
+        assert why.lines[1].startswith("middle (higher, shares radio) waits")
+        assert why.rule == "8"
+    bench.tell(Departed("middle"))
+    bench.run(21.0)
+    assert states(bench)["low"] == "running"
 
 
 def test_why_knows_owners_by_name_and_address_and_rcs():
