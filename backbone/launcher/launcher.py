@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 import signal
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
 import msgspec
 
-from backbone.addresses import NAMESERVER, PLACER
+from backbone.addresses import NAMESERVER
 from backbone.authentication import SECRET_NAME
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, ComponentState, LifeState, LogLevel, Stop, Stopping
-from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnded, Processes, ProcessFell
+from backbone.component.messages import Absence, ComponentState, LifeState, LogLevel
+from backbone.creator.messages import READY_WITHIN_S, ListProcesses, Processes, ProcessFell
 from backbone.creator.process_keeper import ProcessKeeper
-from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.errors import BackboneError
 from backbone.launcher.awaited_hosts import announce_awaited_hosts, awaited_hosts
-from backbone.launcher.consoles_end import stop_consoles
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.declared_orders import hardware_orders, unit_orders
 from backbone.launcher.ending_messages import (
@@ -43,6 +41,7 @@ from backbone.launcher.last_branch import LastBranch, ends_before
 from backbone.launcher.last_run import run_last
 from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
 from backbone.launcher.mission_recorder import MissionRecorder, absences_of
+from backbone.launcher.mission_stop import REASON, MissionStop, stop_consoles, stop_other_hosts
 from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
@@ -55,24 +54,10 @@ from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.naming import Subsystem, address, component_of
 from backbone.picture.words import starts_line
-from backbone.placer.messages import (
-    AskDeclared,
-    DeclaredOrder,
-    Ended,
-    ListPlacements,
-    Placement,
-    Placements,
-    Start,
-    StopComponent,
-)
+from backbone.placer.messages import AskDeclared, DeclaredOrder, Start
 from backbone.run_files import RunFolderRemoved
 from backbone.waiting import end_tasks, first_of
 from backbone.wire import Accepts, Envelope, Message
-
-log = logging.getLogger(__name__)
-
-STOP_TIME_S = 10.0  # chosen: request, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
-LISTING_TIME_S = 1.0  # chosen: a thousand round trips
 
 
 class Launcher(Component[NoParameters]):
@@ -116,6 +101,7 @@ class Launcher(Component[NoParameters]):
         self._hand_recorders = HandRecorderWatch(bus, clock, self._is_deaf, self._recorder_changed)
         self._log = LogKeeper(bus)
         self.outcome = Outcome()
+        self._parts = MissionStop(bus, self.outcome.ended.append)
         self._others_changed = asyncio.Event()
         self._last = LastBranch(description.last)
         self._last_begins, self._last_is_over, self._has_ended = asyncio.Event(), asyncio.Event(), asyncio.Event()
@@ -275,19 +261,21 @@ class Launcher(Component[NoParameters]):
         async with self._step("stop mission"):
             say = announce_awaited_hosts(self._others, self.clock, self._others_changed, self._observer.announce)
             saying = asyncio.create_task(say, name="say what is awaited")
-            await self._stop_mission()
+            await self._parts.stop_all(self._tree.description, self._last.name)
             await end_tasks(saying)
         for host in self._others.lost:
             self._observer.announce(f"{host} is out of reach: end a command that still offers it there with Ctrl-C")
         if self._others.offering:
             async with self._step("stop creators of other hosts"):
-                await self._stop_other_hosts()
+                for offer in await stop_other_hosts(self.bus, self._others, self._others_changed):
+                    say_so = f"{offer} did not confirm its end; a machine that is cut off ends all by itself"
+                    self._observer.announce(say_so)
         async with self._step("stop core services"):
             first, *others = (one.name for one in core_launches(self._description, self.launch, self._options))
             for name in reversed(others):
-                self.outcome.ended.append(await self._keeper.end(name, "the mission ends"))
+                self.outcome.ended.append(await self._keeper.end(name, REASON))
             self._has_ended.set()  # the bus still sends the answers while the first one ends
-            self.outcome.ended.append(await self._keeper.end(first, "the mission ends"))
+            self.outcome.ended.append(await self._keeper.end(first, REASON))
 
     def _backbone_changed(self, address: str, stands: bool) -> None:
         if self._others.token_changed(address, stands, self.clock.now_s()):
@@ -331,8 +319,8 @@ class Launcher(Component[NoParameters]):
         async with self._step("stop consoles"):
             await stop_consoles(self.bus)
         async with self._step("stop behaviors"):
-            await self._stop_roots()
-            await self._stop_placed(lambda placed: placed.type in behaviors)
+            await self._parts.stop_roots(self._tree.description)
+            await self._parts.stop_placed(lambda placed: placed.type in behaviors)
         until_s = self._last.began(self.clock.now_s())
         self.report(self._last.doing)
         self._observer.announce(self._last.doing)
@@ -340,48 +328,6 @@ class Launcher(Component[NoParameters]):
         at = address(Subsystem.MISSION_CONTROL, order.name)
         await run_last(self._last, self.bus, self.clock, at, self._wishes.keep_once(order, at), until_s)
         self.end(reason)
-
-    async def _stop_mission(self) -> None:
-        """Stop behaviors first (each stops its children), then the remaining ARCs, then hardware."""
-        description = self._tree.description
-        hardware = [r.name for r in description.resources] + [c.name for c in description.components]
-        if self._last.name:
-            await self._stop(self._last.name)
-        await self._stop_roots()
-        await self._stop_placed(lambda placed: placed.name not in hardware)
-        await asyncio.gather(*(self._stop(r.name) for r in description.resources))
-        await asyncio.gather(*(self._stop(c.name) for c in description.components))
-
-    async def _stop_roots(self) -> None:
-        """Stop all roots at once, so that a root on a host that is cut off delays no other root."""
-        roots = reversed(behavior_orders(self._tree.description))
-        await asyncio.gather(*(self._stop(order.name) for order in roots))
-
-    async def _stop_placed(self, is_meant: Callable[[Placement], bool]) -> None:
-        with contextlib.suppress(LinkError, Refusal):  # without a placer the creators end the rest
-            there = await self.bus.ask(PLACER, ListPlacements(), Placements, within_s=LISTING_TIME_S)
-            await asyncio.gather(*(self._stop(placed.name) for placed in there.placements if is_meant(placed)))
-
-    async def _stop(self, name: str) -> None:
-        try:
-            ended = await self.bus.ask(PLACER, StopComponent(name, "the mission ends"), Ended, within_s=STOP_TIME_S)
-        except (Refusal, LinkError) as error:
-            log.info("%s: %s", name, error)
-            return
-        self.outcome.ended.append(ProcessEnded(name, ended.by, 0))
-
-    async def _stop_other_hosts(self) -> None:
-        """Ask the other machines to end their creators, and wait; an unreachable machine ends its creator by itself."""
-        stop, soon_s = Stop("the mission ends"), LISTING_TIME_S
-        stops = (self.bus.ask(offer, stop, Stopping, within_s=soon_s) for offer in self._others.offering)
-        await asyncio.gather(*stops, return_exceptions=True)
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(STOP_TIME_S):
-                while self._others.offering:
-                    self._others_changed.clear()
-                    await self._others_changed.wait()
-        for offer in self._others.offering:
-            self._observer.announce(f"{offer} did not confirm its end; a machine that is cut off ends all by itself")
 
     def _core_service_fell(self, fell: ProcessFell) -> None:
         self.publish_event(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
