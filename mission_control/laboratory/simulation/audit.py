@@ -14,6 +14,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
 
+from mission_control.laboratory.simulation.simulated_processes import current_process
+
 
 @dataclass(frozen=True, slots=True)
 class Happening:
@@ -51,7 +53,10 @@ class Audit:
         self.happenings: list[Happening] = []
 
     def note(self, who: str, what: str, **values: object) -> None:
-        """Record an event now."""
+        """Record an event now, but none of a dead process, whose tasks run to their ends."""
+        process = current_process.get()
+        if process is not None and process.is_dead:
+            return
         self.happenings.append(Happening(asyncio.get_running_loop().time(), who, what, values))
 
     def digest(self) -> str:

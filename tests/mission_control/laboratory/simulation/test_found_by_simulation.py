@@ -10,7 +10,7 @@ from examples import some
 from mission_control.laboratory.simulation.faults import Fault, KillFault, MessageFault
 from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
 from mission_control.laboratory.simulation.supervised_mission import run_supervised
-from mission_control.laboratory.simulation.supervision_faults import Cut, End, Pause, SupervisionFault
+from mission_control.laboratory.simulation.supervision_faults import Cut, End, Pause, Starve, SupervisionFault
 
 FOUND: dict[str, tuple[int, list[Fault]]] = {
     "an RC whose renewal came too late lets go, and the RC manager must hear of it": (
@@ -131,6 +131,10 @@ SUPERVISED: dict[str, tuple[int, list[SupervisionFault]]] = {
     "an ARC whose gate stayed shut once is not named while it waits for others": (
         7700180,
         [Cut(3.257729, "h2", 25.930718), End(4.776615, "placer", "politely")],
+    ),
+    "of a process that is killed while it is starved nothing is recorded": (
+        7700487,
+        [Starve(2.402, "h1", 3.777, 0.3), End(4.953, "creator-h1", "killed")],
     ),
 }
 

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable
 
 from backbone.bus.clock import VirtualClock
 from backbone.creator.silence import LOOK_EVERY_S, SHOWN_AFTER_S, Silence
+from mission_control.laboratory.simulation.audit import Audit
 from mission_control.laboratory.simulation.simulated_processes import ProcessLoop, SimulatedProcess, run_processes
 
 CLOCK = VirtualClock()
@@ -106,5 +107,20 @@ def test_a_starved_process_works_only_now_and_then_and_in_order() -> None:
         numbers = [what for _, what in scene.did if what != "tick"]
         assert numbers == [str(number) for number in range(10)]
         assert {at_s for at_s, _ in scene.did if at_s < 10.0} == {1.0, 4.5, 8.0}
+
+    play(body)
+
+
+def test_nothing_is_recorded_of_a_process_that_is_dead() -> None:
+    """The steps that waited run to their ends; the audit took them for acts."""
+
+    async def body(scene: Scene) -> None:
+        audit = Audit()
+        scene.process.pause()
+        scene.process.run(scene.loop.call_soon, audit.note, "scout1", "packet")
+        audit.note("scout1", "killed")
+        scene.process.die()
+        await CLOCK.sleep_s(1.0)
+        assert [each.what for each in audit.happenings] == ["killed"]
 
     play(body)
