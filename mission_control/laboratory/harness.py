@@ -10,7 +10,6 @@ from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from functools import partial
 from multiprocessing.connection import Connection
 from typing import TypeVar
 
@@ -81,8 +80,11 @@ def results_of(
     # A pipe, because an event waits for ever for the answer of a process that was killed.
     orders_end, wanted = context.Pipe(duplex=False)
     with ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(orders_end,)) as pool:
+        chunks = [orders[at : at + chunk] for at in range(0, len(orders), chunk)]
         try:
-            yield from pool.map(partial(_worked, work), orders, chunksize=chunk)
+            # Not by ``pool.map``, which cancels what nobody waits for: Python 3.11 then prints a bug of its own.
+            for done in [pool.submit(_worked, work, part) for part in chunks]:
+                yield from done.result()
         except BaseException as error:
             wanted.close()  # else a person who interrupts waits for half a minute of work
             if isinstance(error, BrokenProcessPool):
@@ -91,7 +93,7 @@ def results_of(
                 ) from error
             raise
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            pool.shutdown(wait=True)
             wanted.close()
             orders_end.close()
 
@@ -114,14 +116,16 @@ def _keep_to_one_core() -> None:
         os.environ.setdefault(threads, "1")
 
 
-def _worked(work: Callable[[Order], Result], order: Order) -> Result:
+def _worked(work: Callable[[Order], Result], orders: Sequence[Order]) -> list[Result]:
     """Do the work; after the first, the garbage collector has little to do.
 
     What was imported by then and is kept it never looks through again, and it looks for garbage less often.
     """
-    result = work(order)
-    if gc.get_threshold()[0] != OBJECTS_AT_ONCE:  # asking how many objects are frozen would count them all
-        gc.collect()
-        gc.freeze()
-        gc.set_threshold(OBJECTS_AT_ONCE)
-    return result
+    results = []
+    for order in orders:
+        results.append(work(order))
+        if gc.get_threshold()[0] != OBJECTS_AT_ONCE:  # asking how many objects are frozen would count them all
+            gc.collect()
+            gc.freeze()
+            gc.set_threshold(OBJECTS_AT_ONCE)
+    return results
