@@ -20,10 +20,11 @@ SILENT_S = 1.0  # as in exchange
 
 
 def class_path_of(value: str) -> str:
-    """Refuse a text that is no class path."""
+    """Refuse a text that is neither a class path nor a name; only a built-in driver has a name instead of a path."""
     from backbone.mission.class_paths import CLASS_PATH
+    from backbone.naming import is_legal
 
-    if CLASS_PATH.fullmatch(value) is None:
+    if CLASS_PATH.fullmatch(value) is None and not is_legal(value):
         raise typer.BadParameter(f"{value!r} is no class; write package.module:Class")
     return value
 
@@ -42,7 +43,9 @@ def swap(
     class_path: Annotated[
         str,
         typer.Argument(
-            metavar="PACKAGE.MODULE:CLASS", callback=class_path_of, help="Its new class; the file is read anew."
+            metavar="PACKAGE.MODULE:CLASS",
+            callback=class_path_of,
+            help="Its new class, or the name of a built-in driver; the file is read anew.",
         ),
     ],
     parameter: Annotated[

@@ -14,6 +14,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.command_line.connection import REPLY_TIME_S, connected
 from backbone.command_line.unit_modules import modules_by_unit
 from backbone.command_line.where import Where
+from backbone.command_line.wrong_words import WrongUsage
 from backbone.component.asking import ask_until_answered
 from backbone.component.messages import Absence, AskState, AskTime, ComponentState, MissionTime
 from backbone.creator.messages import creator_name
@@ -45,6 +46,7 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
     """Exchange the module, the behavior's class or the resource's driver of this name, and print which one is in use.
 
     Raises:
+        WrongUsage: The class of a module or behavior is only a name.
         UnknownModule: Nothing of the mission that can be exchanged has this name.
         Silent: The component of this name does not answer; nothing was changed.
         Refusal: The new one cannot take the place; nothing was changed.
@@ -119,6 +121,7 @@ async def addressed(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
     """Return the address to ask for the exchange, and the question.
 
     Raises:
+        WrongUsage: The class of a module or behavior is only a name, as a built-in driver has.
         UnknownModule: Nothing of the mission that can be exchanged has this name.
         Silent: The component of this name, or a unit that may run it, does not answer or is not up.
     """
@@ -129,10 +132,13 @@ async def addressed(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
     at = {str(one["name"]): unit for unit, modules in told.items() for one in modules or ()}
     silent = [unit for unit, modules in told.items() if modules is None]
     if asked.module in at:
+        _check_class_path(asked)
         return at[asked.module], asked
     others = {component_of(one.address): one.address for one in listed.components if _may_be_exchanged(one)}
     if asked.module in others:
         part = others[asked.module]
+        if not part.startswith(f"{Subsystem.RESOURCE_POOL}/"):
+            _check_class_path(asked)
         try:
             await bus.ask(part, AskState(), ComponentState, within_s=REPLY_TIME_S)
         except LinkError as error:
@@ -144,6 +150,12 @@ async def addressed(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
         may_run_it = f"{asked.module} is not known: {names} does not answer and may run it"
         raise await _silent(bus, may_run_it, {hosts[unit] for unit in silent})
     raise await _unknown(bus, asked.module, {*at, *others}, {component_of(one) for one in hosts})
+
+
+def _check_class_path(asked: SwapModule) -> None:
+    if ":" not in asked.class_path:
+        told = f"{asked.class_path!r} is no class, and only drivers have names; write package.module:Class"
+        raise WrongUsage(told, remedy="See 'scout-backbone swap --help'.")
 
 
 def _may_be_exchanged(one: ComponentState) -> bool:

@@ -157,7 +157,7 @@ def test_a_hub_that_is_not_there_is_one_sentence_without_anything_inner() -> Non
     assert line.startswith("no hub answers at tcp/x:1 (is the mission up there")
 
 
-@pytest.mark.parametrize("wrong", ["", "pair", "pair:", ":Smoothing", "pair.py:Smoothing!", "../pair:Smoothing"])
+@pytest.mark.parametrize("wrong", ["", "pair.py", "pair:", ":Smoothing", "pair.py:Smoothing!", "../pair:Smoothing"])
 def test_a_class_that_is_none_is_wrong_usage_before_any_mission_is_asked(wrong: str) -> None:
     done = CliRunner().invoke(app, ["swap", "smoothing", wrong, "--mission", "m"])
     assert done.exit_code == 2

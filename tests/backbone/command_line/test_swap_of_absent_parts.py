@@ -10,7 +10,9 @@ import pytest
 from backbone.addresses import LAUNCHER, NAMESERVER, PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
+from backbone.command_line.module_commands import class_path_of
 from backbone.command_line.swapping import addressed, swapped_by
+from backbone.command_line.wrong_words import WrongUsage
 from backbone.component.messages import (
     Absence,
     AskParameters,
@@ -57,6 +59,31 @@ def test_what_is_being_started_again_is_not_called_unknown(
         with pytest.raises(refused) as caught:
             await addressed(bus, SwapModule("smoothing", "pair:Smoothing"))
         assert re.search(told, str(caught.value))
+        await bus.close()
+
+    run_virtual(scene())
+
+
+@pytest.mark.parametrize(("at", "is_refused"), [("resource_pool/radio", False), ("mission_control/radio", True)])
+def test_only_the_driver_of_a_resource_is_exchanged_by_the_name_of_a_built_in_one(at: str, is_refused: bool) -> None:
+    there = ComponentState(at, "command_radio", "base", 1, LifeState.READY, 0.0)
+
+    async def listed(_asked: Envelope[Message]) -> Message:
+        return Components([there], complete=True, hub_since_s=0.0)
+
+    async def state(_asked: Envelope[Message]) -> Message:
+        return there
+
+    async def scene() -> None:
+        bus = LocalNetwork("m").join(NAMESERVER, VirtualClock())
+        bus.serve(NAMESERVER, ListComponents, listed)
+        bus.serve(at, AskState, state)
+        asked = SwapModule("radio", class_path_of("simulated"))
+        if is_refused:
+            with pytest.raises(WrongUsage, match=r"'simulated' is no class.*package\.module:Class"):
+                await addressed(bus, asked)
+        else:
+            assert (await addressed(bus, asked))[1].class_path == "simulated"
         await bus.close()
 
     run_virtual(scene())
