@@ -59,7 +59,7 @@ class Consequences:
     Attributes:
         ended: Roots that end.
         begun: Orders of the roots that start.
-        told: Behaviors that stay and change their place, parents before their children.
+        told: Behaviors that stay and change their place or start children again, parents before their children.
         priorities: Name → priority, for each new or changed priority.
     """
 
@@ -96,7 +96,7 @@ def consequences(old: MissionDescription, new: MissionDescription, anew: Collect
             tuple(child for child in before[name].children if child not in node.children),
         )
         for name, node in after.items()
-        if stay[name] and node.order != before[name].order
+        if stay[name] and (node.order != before[name].order or any(child in anew for child in node.children))
     ]
     return Consequences(
         ended=[name for name, node in before.items() if not node.parent and not stay.get(name, False)],

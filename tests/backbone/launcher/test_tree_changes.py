@@ -148,6 +148,15 @@ def test_a_change_that_cannot_be_written_is_refused(change: Any, refusal: type[R
         changed(MISSION, change)
 
 
+@pytest.mark.parametrize("name", ["spare", "left"])
+def test_a_branch_that_is_replaced_by_an_equal_one_starts_again(name: str) -> None:
+    edited = changed(MISSION, ReplaceBranch(0, name, node(name), "equal.xml"))
+    running = Running(read(MISSION))
+    before = running.numbers[name]
+    running.follow(consequences(read(MISSION), read(edited.text), edited.anew))
+    assert running.numbers[name] != before
+
+
 def test_a_fault_in_a_branch_is_named_where_its_own_file_has_it() -> None:
     branch = """<!-- a -->
   <behavior type="sequence" name="new" priority="4">
@@ -245,5 +254,7 @@ def test_after_any_changes_all_runs_as_if_it_had_come_up_so_and_what_stays_was_n
         if not isinstance(change, ReplaceBranch | MoveBranch):
             stay = orders(mission).keys() & orders(new).keys()
             assert {name: running.numbers[name] for name in stay} == {name: before[name] for name in stay}
+        for name in edited.anew & before.keys():
+            assert running.numbers[name] != before[name], f"{name} was replaced, and goes on as before"
         mission, text = new, edited.text
     assume(done)
