@@ -248,6 +248,11 @@ class DeadMan:
         for grip in self._grips:
             grip.require_let_go()
 
+    def stood_still(self, for_s: float) -> None:
+        """Record that this process read no presses for this time, so it heard no release in it."""
+        for grip in self._grips:
+            grip.stood_still(for_s)
+
     def is_held_back(self, now_s: float) -> bool:
         """Return whether a held control must be released before it moves anything."""
         return any(grip.is_held_back(now_s) for grip in self._grips)

@@ -16,7 +16,7 @@ class ControlGrip:
     """A control of an operator.
 
     Laws: after ``require_let_go`` no press counts until the control was released. A release is reported, or follows
-    from a silence longer than the last press lasts.
+    from a silence longer than the last press lasts. A time in which no press was read is no silence.
     """
 
     def __init__(self) -> None:
@@ -47,6 +47,11 @@ class ControlGrip:
         if counts:
             self._waits = False
         return counts
+
+    def stood_still(self, for_s: float) -> None:
+        """Record that presses were not read for this time: it is no silence of the control."""
+        if self._waits:
+            self._until_s += for_s
 
     def is_held_back(self, now_s: float) -> bool:
         """Return whether the control is held and must be released before it counts."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import Awaitable
 from typing import TYPE_CHECKING
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from ui_console.session.observer import AnyObserver
 
 
+LOOK_EVERY_S = 0.1  # chosen: a process that stands still for less than that loses no press
+
+
 class Controls:
     """Sends commands while a robot is held, and shows the outcome of each."""
 
@@ -38,6 +42,7 @@ class Controls:
         self._dead_man, self._span = DeadMan(), DriveSpan()
         self._pressed = asyncio.Event()
         self._is_held_back = False
+        self._looks_s = math.inf
         self._arc: ArcClient | None = None
         self._is_on = False
         self.abilities: ArcAbilities | None = None
@@ -77,7 +82,7 @@ class Controls:
             drive: The command of the key.
             lasts_s: How long the press counts, machine seconds, for a control that repeats while held; None: as keys.
         """
-        counts = self._dead_man.press(drive, asyncio.get_running_loop().time(), lasts_s)
+        counts = self._dead_man.press(drive, self._press_s(), lasts_s)
         self._pressed.set()
         return counts
 
@@ -85,7 +90,7 @@ class Controls:
         """Record a press of the control for one command; return whether it counts, see ``DeadMan``."""
         if self.abilities is not None and not self.abilities.moves(word):
             return True
-        counts = self._dead_man.press_once(asyncio.get_running_loop().time())
+        counts = self._dead_man.press_once(self._press_s())
         self._pressed.set()
         return counts
 
@@ -99,7 +104,7 @@ class Controls:
         loop = asyncio.get_running_loop()
         while True:
             self._pressed.clear()
-            self._show_held_back(loop.time())
+            self._show_held_back(self._press_s())
             command = self._dead_man.due(loop.time())
             if command is not None and self._is_on and self._arc is not None and self._arc.granted is not None:
                 await self.do(command)
@@ -110,9 +115,21 @@ class Controls:
                 continue
 
     def _next_s(self) -> float | None:
-        """Return the time of the next due command or notice if no key is pressed; None: not before a press."""
-        times = [self._dead_man.next_s, self._dead_man.let_go_s if self._is_held_back else None]
-        return min((at_s for at_s in times if at_s is not None), default=None)
+        """Return the time of the next due command or look if no key is pressed; None: not before a press."""
+        self._looks_s, let_go_s = math.inf, self._dead_man.let_go_s
+        if self._is_held_back and let_go_s is not None:
+            self._looks_s = min(asyncio.get_running_loop().time() + LOOK_EVERY_S, let_go_s)
+        next_s = self._dead_man.next_s
+        soonest_s = self._looks_s if next_s is None else min(next_s, self._looks_s)
+        return soonest_s if soonest_s < math.inf else None
+
+    def _press_s(self) -> float:
+        """Return the time of a press; if this process comes late to it, it may have stood still beside a held key."""
+        now_s = asyncio.get_running_loop().time()
+        if now_s > self._looks_s:
+            self._dead_man.stood_still(now_s - self._looks_s)
+            self._looks_s = now_s
+        return now_s
 
     def _show_held_back(self, loop_s: float) -> None:
         """Show the operator that a held control must be released, and that it was released."""

@@ -13,12 +13,13 @@ from held_robot import FORWARD, REPEAT_S, HeldRobot
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.clock import VirtualClock, VirtualLoop, run_virtual
 from resource_pool.arc_client import EmergencyStopped
 from resource_pool.commands import Drive as ArcDrive
 from resource_pool.commands import Halt as ArcHalt
 from resource_pool.messages import GiveCommand
 from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, GiveWish, HaltWish, MoveWish
+from ui_console.session.controls import LOOK_EVERY_S
 from ui_console.session.scripted import ScriptDriver
 
 
@@ -104,6 +105,21 @@ def test_a_jump_key_that_is_held_jumps_no_more_until_it_was_let_go() -> None:
 Scene = Callable[[HeldRobot], Awaitable[None]]
 
 
+class StallingLoop(VirtualLoop):
+    """The loop of a process that may stand still."""
+
+    stood_s = 0.0
+
+    def time(self) -> float:
+        return super().time() + self.stood_s
+
+
+def stand_still(for_s: float) -> None:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, StallingLoop)
+    loop.stood_s += for_s
+
+
 @pytest.fixture
 def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
     def run(scene: Scene) -> None:
@@ -119,7 +135,8 @@ def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
                     await on.rc.close()
                     await placer.close()
 
-        run_virtual(main())
+        with asyncio.Runner(loop_factory=StallingLoop) as runner:
+            runner.run(main())
 
     return run
 
@@ -166,6 +183,27 @@ def test_after_a_lift_a_held_control_moves_nothing_until_it_is_pressed_anew(
         await on.hold_key(0.5, lasts_s)
         assert on.drives()
         assert {drive.after_stop for drive in on.drives()} == {on.latch.state.number}
+
+    stage(scene)
+
+
+@pytest.mark.parametrize("for_s", [0.2, 1.0, 60.0])
+@pytest.mark.parametrize("lasts_s", HANDS)
+def test_a_control_held_while_the_console_stands_still_was_not_let_go(
+    stage: Callable[[Scene], None], lasts_s: float | None, for_s: float
+) -> None:
+    async def scene(on: HeldRobot) -> None:
+        await on.hold_key(1.0, lasts_s)
+        on.console.require_let_go()
+        await on.hold_key(0.5, lasts_s)
+        on.arc.commands.clear()
+        for _time in range(3):
+            stand_still(for_s)
+            await on.hold_key(0.5, lasts_s)
+        assert not on.drives()
+        await on.clock.sleep_s(KEYS_LET_GO_S + LOOK_EVERY_S)
+        await on.hold_key(0.5, lasts_s)
+        assert on.drives()
 
     stage(scene)
 
