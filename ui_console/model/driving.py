@@ -20,7 +20,8 @@ FIRST_HOLD_S = 0.5  # chosen: bridges the delay of usual keyboards before they r
 KEYS_LET_GO_S = 0.7  # chosen: longer than keyboards' delay before they repeat (X: 0.66 s), so the key was released
 REPEATED_HOLD_S = (0.15, FIRST_HOLD_S)  # chosen: bounds of the hold once the rhythm of the repeats is known
 HOLD_INTERVALS = 3.0  # chosen: two lost repeats are bridged
-REPEAT_EVERY_S = 0.1  # chosen: 10 Hz; commands end by themselves after 0.5 s at the robot
+REPEAT_EVERY_S = 0.1  # chosen: 10 Hz
+COMMAND_LASTS_S = 0.5  # as COMMAND_TIMEOUT_S of the resource pool: a robot halts by itself then
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,15 +170,20 @@ def move_by_stick(forward: float, right: float, speed: float, reach: Reach) -> M
 class DriveSpan:
     """Finds begin and end of an operator's drives among the applied commands.
 
-    Laws: begin and end alternate, and a begin comes first; only a motion begins a drive.
+    Laws: begin and end alternate, and a begin comes first; only a motion begins a drive. A drive ends at the latest
+    when the robot halts by itself after the last motion.
     """
 
     def __init__(self) -> None:
         self._began_s: float | None = None
+        self._moved_s = 0.0
 
     def begins(self, command: Command, at_s: float) -> bool:
         """Record an applied command; return True if a drive begins with it."""
-        if self._began_s is not None or not isinstance(command, Motion):
+        if not isinstance(command, Motion):
+            return False
+        self._moved_s = at_s
+        if self._began_s is not None:
             return False
         self._began_s = at_s
         return True
@@ -185,7 +191,7 @@ class DriveSpan:
     def ends(self, at_s: float) -> float | None:
         """End the drive: the wheels stand, or the robot is gone. Return its duration, seconds; None: no drive."""
         began_s, self._began_s = self._began_s, None
-        return None if began_s is None else max(0.0, at_s - began_s)
+        return None if began_s is None else max(0.0, min(at_s, self._moved_s + COMMAND_LASTS_S) - began_s)
 
 
 class DeadMan:

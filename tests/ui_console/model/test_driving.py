@@ -4,11 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from resource_pool.messages import COMMAND_TIMEOUT_S
 from resource_pool.rcs.scout import MOST_M_S, MOST_TURN_RAD_S
 from scout_model.dimensions import WHEEL_SPEED_LIMIT_RAD_S
 from scout_model.scout import wheels_rad_s
 from ui_console.model.arc_abilities import Reach
 from ui_console.model.driving import (
+    COMMAND_LASTS_S,
     FIRST_HOLD_S,
     REPEAT_EVERY_S,
     SPEED,
@@ -124,6 +126,18 @@ def test_the_begin_and_the_end_of_a_drive_take_turns(applied: list[MoveWish | Ha
                 assert took_s >= 0
                 told.append("end")
     assert told == (["begin", "end"] * len(told))[: len(told)]
+
+
+@pytest.mark.parametrize(("heard_s", "took_s"), [(12.3, 2.3), (72.0, 2.5)])
+def test_a_drive_whose_end_is_heard_late_ended_when_the_robot_halted_by_itself(heard_s: float, took_s: float) -> None:
+    span = DriveSpan()
+    for tick in range(21):
+        span.begins(FORWARD, 10.0 + tick * REPEAT_EVERY_S)
+    assert span.ends(heard_s) == pytest.approx(took_s)
+
+
+def test_a_robot_halts_by_itself_when_the_drive_counts_as_over() -> None:
+    assert COMMAND_LASTS_S == COMMAND_TIMEOUT_S
 
 
 _shares = st.floats(0.05, 1.0)
