@@ -32,6 +32,7 @@ SILENT_S = 3.0  # chosen: time from the grant to the first picture: frequencies 
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be mistaken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
+BACK_REMEDY = "Other ARCs may have moved it meanwhile: look where it is before you drive."
 
 
 class ConsoleModel:
@@ -303,9 +304,12 @@ class ConsoleModel:
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
             case events.AbilitiesKnown(abilities=abilities):
                 self.abilities = abilities if self.asked is not None else None
-            case events.Granted(robot=robot):
+            case events.Granted(robot=robot, at_s=at_s):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
                 alarms.mended((views.AlarmKind.TAKEN, views.AlarmKind.REFUSED, views.AlarmKind.NO_ANSWER))
+                if self._went is not None:
+                    line = f"{robot} was lost and is yours again: {self._went.why}"
+                    alarms.happened(views.AlarmKind.TAKEN, robot, line, at_s, BACK_REMEDY, key=f"back:{self.name}")
                 self._went = None
                 self.robot = robot or self.robot
             case events.CommandApplied():

@@ -49,6 +49,9 @@ def test_a_robot_lost_without_a_decision_is_said_to_be_lost_while_the_console_as
     assert (lost.robot, lost.at_s, lost.may_retake, lost.why) == ("scout1", 12.0, False, why)
     shown.apply(Granted(14.0, "scout1", GRANT.rcs, {"scout1": 8}, 20.0, 9.95, True))
     assert shown.own(14.0).lost is None
+    shown.look(14.1)
+    [told] = [alarm for alarm in shown.alarm_views() if alarm.kind is AlarmKind.TAKEN]
+    assert told.line == f"scout1 was lost and is yours again: {why}"
 
 
 def test_whose_turn_is_over_has_lost_nothing() -> None:
