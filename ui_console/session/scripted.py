@@ -9,20 +9,24 @@ import selectors
 import threading
 from collections.abc import Callable
 
-from backbone.errors import Refusal
+from backbone.addresses import RC_MANAGER
+from backbone.errors import LinkError, Refusal
 from backbone.launcher.endings import ExitCode
 from backbone.picture.words import UNDECIDED
-from backbone.rc_manager.messages import StaleEpoch
+from backbone.rc_manager.messages import AskWhy, StaleEpoch
+from backbone.scheduling.views import Why
 from backbone.waiting import set_within
 from resource_pool.arc_client import EmergencyStopped, StopState, Suspended, SwappedOut
 from ui_console.model import events
 from ui_console.model.driving import Command, GiveBack, GiveWish, HaltWish, Motion, OrderWish, StopAll, StopRobot
 from ui_console.model.orders import OrderState
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
+from ui_console.session.feed import REPLY_TIME_S
 from ui_console.session.teleoperation import Teleoperation
 
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
+TOLD_AFTER_S = 1.0  # chosen: a grant for which no other ARC has to end its slice is there by then
 _FOR_SCREENS_ONLY = (events.Asked, events.AbilitiesKnown, events.MomentBegan, events.PictureSeen, events.TurnedTo)
 
 
@@ -132,6 +136,7 @@ class ScriptDriver:
             await asyncio.wait(self._stopping)
 
     async def _play_when_granted(self, console: Teleoperation) -> None:
+        telling = console.start_task(self._tell_why_it_waits(console), "why")
         try:
             async with asyncio.timeout(self._within_s / console.clock.rate if self._within_s else None):
                 await console.wait_granted()
@@ -145,6 +150,8 @@ class ScriptDriver:
             return
         except Refusal:
             return
+        finally:
+            telling.cancel()
         self._granted = True
         await self._play(console, console.clock.now_s())
 
@@ -155,6 +162,17 @@ class ScriptDriver:
         if console.refusal is not None or self._failed or self._player.held_back:
             return ExitCode.REFUSED
         return ExitCode.DONE if self._granted and console.given_back else ExitCode.NO_BACKBONE
+
+    async def _tell_why_it_waits(self, console: Teleoperation) -> None:
+        """Write why the claim waits, once, unless it is granted soon."""
+        await console.clock.sleep_s(TOLD_AFTER_S)
+        try:
+            why = await console.bus.ask(
+                RC_MANAGER, AskWhy(console.parameters.arc(console.bus)), Why, within_s=REPLY_TIME_S
+            )
+        except (LinkError, Refusal):  # no request is there yet, or its reasons cannot be asked for
+            return
+        self._write(events.event_json(events.Heard(console.clock.now_s(), why)))
 
     async def _play(self, console: Teleoperation, granted_s: float) -> None:
         clock = console.clock

@@ -11,10 +11,14 @@ import pytest
 from driven_console import console, grant_at_once
 from fake_resource_pool import FakeArc, FakePlacer
 
+from backbone.addresses import RC_MANAGER
 from backbone.placer.messages import NoHost
+from backbone.rc_manager.messages import AskWhy
+from backbone.scheduling.views import Why
+from backbone.wire import Envelope
 from resource_pool.arc_client import NoSuchAction
 from ui_console.model.script import read_script
-from ui_console.session.scripted import ScriptDriver
+from ui_console.session.scripted import TOLD_AFTER_S, ScriptDriver
 
 SCRIPT = '{"at_s":0.5,"left_rad_s":4,"right_rad_s":4}\n{"at_s":3,"release":true}\n'
 
@@ -88,6 +92,21 @@ def test_a_grant_that_does_not_come_in_time_ends_with_five_and_leaves_no_claim(p
         assert code == 5
         assert [line["event"] for line in lines] == ["refused", "released"]
         assert not placer.arcs
+
+    placer_world(scene)
+
+
+def test_a_script_that_waits_for_its_grant_is_told_once_why(placer_world: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        async def why(asked: Envelope[AskWhy]) -> Why:
+            return Why(asked.body.name, "waiting", ["console-9 has the higher priority"], "9", [], -1.0, "")
+
+        placer.bus.serve(RC_MANAGER, AskWhy, why)
+        code, lines = await play(placer, SCRIPT, within_s=20.0)
+        assert code == 5
+        assert [line["event"] for line in lines] == ["why", "refused", "released"]
+        assert lines[0]["why"]["lines"] == ["console-9 has the higher priority"]
+        assert lines[0]["at_s"] == pytest.approx(TOLD_AFTER_S, abs=0.5)
 
     placer_world(scene)
 
