@@ -12,10 +12,12 @@ from web_stage import Stage
 
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
+from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from resource_pool.arcs.drive import DriveArc
 from resource_pool.arcs.skeleton import LitDriveArc
 from resource_pool.commands import Move
+from resource_pool.messages import Readings
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
@@ -24,6 +26,17 @@ CAPTURE = ComponentType(
 )
 HANDS = ("pad", "halt", "release", "stop-mine", "speed")
 HARDWARE = [Resource(f"{kind}1", kind) for kind in LitDriveArc.kinds().values()]
+
+
+OTHERS = """() => {
+  const buttons = [...document.querySelectorAll("#thumbs .robot button, #map button, #tabs button")];
+  const seen = buttons.filter((one) => one.checkVisibility());
+  return Object.fromEntries(seen.map((one) => {
+    const { x, y } = one.getBoundingClientRect();
+    return [`${one.closest(".robot")?.dataset.robot ?? ""} ${one.textContent}`, [x, y + scrollY]];
+  }));
+}"""
+"""The places of the buttons that are not the hand's, on the page."""
 
 
 async def centers(page: Any, *names: str) -> dict[str, tuple[int, int]]:
@@ -49,6 +62,60 @@ async def test_pad_and_buttons_stay_when_the_robot_is_granted_and_when_its_comma
         stage.know_commands([CAPTURE, *lit_types("lit_drive")], HARDWARE)
         await page.locator("#commands").wait_for()
         assert await centers(page, *HANDS) == held, "commands known"
+
+
+@pytest.mark.parametrize("size", ["desktop", "tablet"])
+async def test_the_buttons_of_other_robots_stay_when_a_robot_is_granted_and_when_its_commands_are_known(
+    stage: Stage, size: str
+) -> None:
+    async with page_at(stage, size) as page:
+        stage.placer.on_arc = lambda arc: None
+        await card(page).get_by_role("button", name="Take over").click()
+        await page.wait_for_selector("body.is-asking")
+        waiting = await page.evaluate(OTHERS)
+        assert "scout2 Stop" in waiting
+        for arc in stage.placer.arcs.values():
+            await arc.grant()
+        await page.wait_for_selector("body[data-held=scout1]")
+        assert await page.evaluate(OTHERS) == waiting, "granted"
+        stage.know_commands([CAPTURE, *lit_types("lit_drive")], HARDWARE)
+        await page.get_by_role("combobox", name="Taken with").wait_for()
+        await page.locator("#commands").wait_for()
+        assert await page.evaluate(OTHERS) == waiting, "commands known"
+
+
+BUTTONS = """() => [...document.querySelectorAll(".robot .row button, #pad")].map((one) => {
+  const { x, y } = one.getBoundingClientRect();
+  return [x, y + scrollY];
+})"""
+"""The places of the pad and of the buttons on all cards, on the page."""
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_no_button_moves_when_robots_begin_to_report_and_when_they_end(stage: Stage, size: str) -> None:
+    async with page_at(stage, size) as page:
+        before = await page.evaluate(BUTTONS)
+        for robot in ("scout1", "scout2", "scout3"):
+            bus = stage.robots[robot].bus
+            values = {"battery_share": 0.87, "motor_load": 0.05}
+            bus.publish(bus.source, Conversation.READINGS, Readings(robot, stage.clock.now_s(), values))
+        await card(page, "scout3").locator(".gauges", has_text="battery 87 %").wait_for()
+        assert await page.evaluate(BUTTONS) == before
+        shown, ended = await page.evaluate(REPORTS_THAT_END)
+        assert ended == shown > 0
+
+
+REPORTS_THAT_END = """async () => {
+  const { Gauges } = await import("./gauges.js");
+  const reports = new Gauges("scout1");
+  document.querySelector(".robot").append(reports.root);
+  reports.show([{ name: "battery", text: "87 %", share: 0.87, flag: null, span: "", doc: "", is_share: true }]);
+  reports.root.open = true;
+  const shown = reports.root.offsetHeight;
+  reports.show([]);
+  return [shown, reports.root.offsetHeight];
+}"""
+"""The heights of an open list of reports, and after the last of them."""
 
 
 PLACES = """names => {

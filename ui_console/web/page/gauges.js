@@ -55,6 +55,7 @@ export class Gauges {
   /** @param {GaugeView[]} gauges */
   show(gauges) {
     this.root.hidden = gauges.length === 0;
+    if (this.root.hidden) return; // its rows keep the place
     const kinds = gauges.map((gauge) => `${gauge.name} ${drawnAs(gauge)}`).join("\n");
     if (kinds !== this.drawn) {
       this.drawn = kinds;
