@@ -147,7 +147,20 @@ CARD = {
     "enlarge": ".enlarge",
     "lift": ".lift",
 }
-CONTROLS = ("theme", "stop-all", "pad", "stop-mine", "halt", "take", "may-i", "release", "speed", "panel", "news")
+CONTROLS = (
+    "theme",
+    "stop-all",
+    "pad",
+    "stop-mine",
+    "halt",
+    "take",
+    "may-i",
+    "release",
+    "speed",
+    "panel",
+    "news",
+    "more",
+)
 SEEN = "document.getElementById('seen-panel').open = true; "
 BUS = "document.getElementById('bus-panel').open = true; "
 BUS_VIEW = f"{BUS}document.getElementById('bus-view').hidden = false; "
