@@ -1,4 +1,4 @@
-"""The index at the end of an MCAP file: whether it is whole, and where its messages are. Pure.
+"""The index at the end of an MCAP file: whether it is whole, and the messages that it leads to. Pure.
 
 The index of an hour names some thousand chunks, each with dozens of channels. The library makes an object of each, a
 dozen times the size of the file's own form. Here they stay packed, and are unpacked chunk by chunk.
@@ -6,14 +6,13 @@ dozen times the size of the file's own form. Here they stay packed, and are unpa
 
 from __future__ import annotations
 
-import copy
 import io
 import os
 import struct
 import sys
 import zlib
 from collections.abc import Container, Iterable, Iterator, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import IO, NamedTuple, cast
 
 from mcap.data_stream import ReadDataStream
@@ -22,7 +21,6 @@ from mcap.reader import SeekingReader
 from mcap.records import (
     AttachmentIndex,
     Channel,
-    Chunk,
     ChunkIndex,
     Message,
     MessageIndex,
@@ -30,10 +28,10 @@ from mcap.records import (
     Schema,
     Statistics,
 )
-from mcap.stream_reader import MAGIC_SIZE, StreamReader, get_chunk_data_stream
+from mcap.stream_reader import MAGIC_SIZE, StreamReader
 from mcap.summary import Summary
 
-from backbone.wire import MAX_LARGE_MESSAGE_BYTES
+from backbone.recording.chunks import MOST_RECORD_BYTES, chunk_records, message_at, record_at
 
 _END = struct.Struct("<BQQQI8x")  # MCAP specification, op 0x02 and the magic: the end of every whole file
 _BEGIN = struct.Struct("<BQ")  # MCAP specification: the kind and the length of a record
@@ -41,7 +39,6 @@ _OFFSET = struct.Struct("<HQ")  # MCAP specification, op 0x08: an entry of messa
 _CHUNK_HEAD = struct.Struct("<QQQQI")  # MCAP specification, op 0x08: the fields before these entries
 _AFTER_OFFSETS = struct.Struct("<QI")  # message_index_length, length of the compression's name
 _SIZES = struct.Struct("<QQ")  # compressed, uncompressed
-MOST_RECORD_BYTES = 2 * MAX_LARGE_MESSAGE_BYTES  # chosen: a whole chunk fits; a damaged length asks for terabytes
 KEPT_CHUNKS = 4  # chosen: messages that are read together stand in few chunks, of some 250 kB
 
 
@@ -81,20 +78,6 @@ class IndexedReader(SeekingReader):
     def get_summary(self) -> Summary:
         """Return the index."""
         return self._index
-
-    def between(self, begin_ns: int, end_ns: int | None) -> IndexedReader | None:
-        """Return a reader of the chunks that may have messages of this time; None: there are none.
-
-        The library examines all channels of each chunk of a file for each question.
-        """
-        narrowed, index = copy.copy(self), copy.copy(self._index)
-        index.chunk_indexes = [
-            one
-            for one in index.chunk_indexes
-            if one.message_end_time >= begin_ns and (end_ns is None or one.message_start_time <= end_ns)
-        ]
-        narrowed._index = index  # noqa: SLF001  of the same class
-        return narrowed if index.chunk_indexes else None
 
 
 def _checked_index(file: IO[bytes]) -> bytes:
@@ -205,7 +188,7 @@ class MessagePlaces:
     def __init__(self, file: IO[bytes], index: Summary) -> None:
         self._file = file
         self._chunks = sorted(index.chunk_indexes, key=lambda one: one.message_end_time, reverse=True)
-        self._records = lru_cache(KEPT_CHUNKS)(self._read_records)
+        self._records = lru_cache(KEPT_CHUNKS)(partial(chunk_records, file))
 
     def newest_first(self, channels: set[int], before_ns: int) -> Iterator[tuple[MessagePlace, int]]:
         """Yield the places of all messages before a time in these channels, with their channels.
@@ -235,33 +218,18 @@ class MessagePlaces:
         Raises:
             ValueError: The file is damaged.
         """
-        data = self._records(place.chunk)
-        kind, length = _BEGIN.unpack_from(data, place.offset)
-        begin = place.offset + _BEGIN.size
-        found: Message = Message.read(ReadDataStream(io.BytesIO(data[begin : begin + length])), length)
-        if kind != Opcode.MESSAGE or (found.channel_id, found.log_time) != (channel, place.at_ns):
+        found = message_at(self._records(place.chunk), place.offset)
+        if found is None or (found.channel_id, found.log_time) != (channel, place.at_ns):
             raise ValueError("its index leads to another message")
         return found
 
     def _places(self, chunk: ChunkIndex, channel: int, at: int, before_ns: int) -> list[MessagePlace]:
         """Return the places of the messages of a channel in a chunk before a time."""
-        found = self._record(at, Opcode.MESSAGE_INDEX)
+        found = record_at(self._file, at, Opcode.MESSAGE_INDEX)
         index = MessageIndex.read(ReadDataStream(io.BytesIO(found)))
         if index.channel_id != channel:
             raise ValueError("its index names another channel")
         return [MessagePlace(ns, chunk.chunk_start_offset, offset) for ns, offset in index.records if ns < before_ns]
-
-    def _read_records(self, chunk: int) -> bytes:
-        found = Chunk.read(ReadDataStream(io.BytesIO(self._record(chunk, Opcode.CHUNK))))
-        stream, length = get_chunk_data_stream(found, validate_crc=True)
-        return stream.read(length)
-
-    def _record(self, at: int, kind: Opcode) -> bytes:
-        self._file.seek(at)
-        found, length = _BEGIN.unpack(self._file.read(_BEGIN.size))
-        if found != kind or length > MOST_RECORD_BYTES:
-            raise ValueError("its index leads to another record")
-        return self._file.read(length)
 
 
 def _still(channels: Container[int], found: Iterable[tuple[MessagePlace, int]]) -> Iterator[tuple[MessagePlace, int]]:

@@ -18,6 +18,7 @@ from mcap.stream_reader import CRCValidationError
 from zstandard import ZstdError
 
 from backbone.errors import Refusal
+from backbone.recording.chunks import messages_in
 from backbone.recording.file_index import IndexedReader, MessagePlace, MessagePlaces, names_all
 from backbone.recording.hearing import is_meant
 from backbone.recording.translation import Translated
@@ -26,6 +27,7 @@ from backbone.recording.writer import ABOUT, NS, PROFILE
 MOST_LEVELS = 850  # chosen: Python's limit of 1000 calls, less six times the calls that lead to its loop
 NOTHING_OF_ONE = "Name a recording; this file has nothing of one."
 DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
+_END_NS = 2**64  # MCAP specification: a time is a uint64
 _MAGIC = b"\x89MCAP0\r\n"  # MCAP specification: the begin of every file
 
 
@@ -128,7 +130,7 @@ class Recording:
             raise NotOfMessages(f"the file is of profile {profile!r}, a recording of {PROFILE!r}")
         if not names_all(summary):
             raise NoRecording("the recording has no complete index")
-        self._summary, self._places = summary, MessagePlaces(file, summary)
+        self._file, self._summary, self._places = file, summary, MessagePlaces(file, summary)
         self._name = getattr(file, "name", "the recording")
 
     def contents(self) -> Contents:
@@ -221,24 +223,21 @@ class Recording:
         newest_first: bool = False,
     ) -> Iterator[tuple[Schema | None, Channel, Message, Recorded]]:
         """Yield the messages, see ``messages``, with their records in the file."""
-        if until_s is not None and until_s < since_s:
-            return
-        named = [(channel.topic, *_named(channel)[:2]) for channel in self._summary.channels.values()]
-        topics = {
-            topic
-            for topic, key, sender in named
-            if not key or ((not patterns or is_meant(key, patterns)) and source in ("", sender))
-        }
-        end_ns = None if until_s is None else round(until_s * NS)
-        begin_ns = max(0, round(since_s * NS))
-        reader = self._reader.between(begin_ns, end_ns)
-        if reader is None:
-            return
-        found = reader.iter_messages(topics, starting_at=begin_ns, ending_at=end_ns, reverse=newest_first)
+
+        def is_wanted(key: str, sender: str) -> bool:
+            return (not patterns or is_meant(key, patterns)) and source in ("", sender)
+
+        named = self.channels()
+        wanted = {number for number, (key, sender, _schema) in named.items() if not key or is_wanted(key, sender)}
+        begin_ns, end_ns = max(0, round(since_s * NS)), _END_NS if until_s is None else round(until_s * NS)
+        index = self._summary
+        found = messages_in(self._file, index.chunk_indexes, wanted, begin_ns, end_ns, newest_first=newest_first)
         with _refusing_damage(self._name):
-            for schema, channel, message in found:
+            for message in found:
+                channel = index.channels[message.channel_id]
+                schema = index.schemas[channel.schema_id] if channel.schema_id else None
                 recorded = _recorded(channel, message)
-                if (not patterns or is_meant(recorded.key, patterns)) and source in ("", recorded.source):
+                if named[channel.id][0] or is_wanted(recorded.key, recorded.source):
                     yield schema, channel, message, recorded
 
 

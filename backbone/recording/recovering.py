@@ -23,7 +23,8 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Mc
 from mcap.stream_reader import MAGIC_SIZE, StreamReader, breakup_chunk
 from mcap.summary import Summary
 
-from backbone.recording.file_index import MOST_RECORD_BYTES, IndexedReader, names_all
+from backbone.recording.chunks import MOST_RECORD_BYTES
+from backbone.recording.file_index import IndexedReader, names_all
 from backbone.recording.reader import (
     DAMAGED,
     NOTHING_OF_ONE,

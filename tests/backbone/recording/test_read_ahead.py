@@ -13,7 +13,6 @@ import pytest
 from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mcap.stream_reader import breakup_chunk
 from small_recordings import CLASSES, SCOUT, Said, recorded
 
 from backbone.addresses import LAUNCHER, NAMESERVER
@@ -21,6 +20,7 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation, address_of
+from backbone.recording.chunks import chunk_records
 from backbone.recording.player import Player
 from backbone.recording.read_ahead import GAP_S, MOST_AHEAD_BYTES, ReadAhead
 from backbone.recording.reader import NoRecording, Recorded, Recording
@@ -77,7 +77,7 @@ def played(file: io.BytesIO, chunk_s: float = 0.0) -> list[tuple[str, float, flo
 
     def decode_chunk(*args: Any, **options: Any) -> Any:
         clock.worked_s += chunk_s
-        return breakup_chunk(*args, **options)
+        return chunk_records(*args, **options)
 
     async def play() -> None:
         bus = LocalNetwork("night").join("backbone/replay", clock)
@@ -89,7 +89,7 @@ def played(file: io.BytesIO, chunk_s: float = 0.0) -> list[tuple[str, float, flo
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(LocalBus, "pass_on", pass_on)
-        patched.setattr("mcap.reader.breakup_chunk", decode_chunk)
+        patched.setattr("backbone.recording.chunks.chunk_records", decode_chunk)
         run_virtual(play())
     return log
 
