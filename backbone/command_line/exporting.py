@@ -8,7 +8,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from importlib import import_module
 from pathlib import Path
-from typing import ClassVar, Protocol
+from tempfile import TemporaryFile
+from typing import Any, ClassVar, Protocol
+
+import msgspec
 
 from backbone.command_line.opened_recording import opened, require_selected
 from backbone.command_line.unusable_file import new_folder
@@ -22,7 +25,9 @@ VIDEOS = "mission_control.vision.recorded_video"  # named as text, because impor
 DATA_SETS = "mission_control.training_data.lerobot_dataset"  # as text for the same reason
 ROWS_AT_ONCE = 1000  # chosen: so many rows of a table are in memory, and in a row group of Parquet
 MOST_WAITING_BYTES = 1 << 26  # chosen: a mission of hundreds of keys needs no more, and a table's batch stays large
+_decode_batch = msgspec.json.Decoder(tuple[str, list[dict[str, Any]]]).decode
 COLUMN_BYTES = 150  # measured: a value in its dictionary, with the name of its column
+_LONG = str, list
 
 
 class TableWriter(Protocol):
@@ -53,17 +58,19 @@ class CsvTables:
 
     def learn(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
         """Note the names of the columns."""
+        columns = self._columns[table]
         for row in rows:
-            self._columns[table].update(dict.fromkeys(row))
+            if not row.keys() <= columns.keys():
+                columns.update(dict.fromkeys(row))
 
     def write(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
         """Append rows, the first below a line with the names."""
         with (self._folder / f"{table}.csv").open("a", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(self._columns[table]))
+            writer, [at_s, *others] = csv.writer(file), self._columns[table]
             if table not in self._begun:
                 self._begun.add(table)
-                writer.writeheader()
-            writer.writerows({**row, "at_s": f"{row['at_s']:.6f}"} for row in rows)
+                writer.writerow(self._columns[table])
+            writer.writerows([f"{row[at_s]:.6f}", *map(row.get, others)] for row in rows)
 
     def close(self) -> None:
         """Do nothing: each file is complete already."""
@@ -81,7 +88,7 @@ async def export(
         require_selected(recording, path, keys)
         with new_folder(folder) as made:
             with closing(make_tables(made)) as tables:
-                names, rows = _write_tables(recording, tables, keys)
+                names, rows = _write_tables(recording, made, tables, keys)
             videos = import_module(VIDEOS).write_videos(recording, made, keys) if with_videos else []
     said = f"{folder}: {counted(names, 'table')} with {counted(rows, 'row')}"
     say(f"{said}, {counted(len(videos), 'video')}" if with_videos else said)
@@ -100,22 +107,28 @@ async def export_for_lerobot(
     return ExitCode.DONE
 
 
-def _write_tables(recording: Recording, tables: TableWriter, keys: tuple[str, ...]) -> tuple[int, int]:
-    split, names, found, count = tables.splits_lists, FileNames(), set(), 0
-    for table, rows in _batches(names, ((one, row_of(one, splits_lists=split)) for one in recording.messages(keys))):
-        tables.learn(table, rows)
-        found.add(table)
-        count += len(rows)
-    for table, rows in _batches(names, _commanded_rows(recording, keys, splits_lists=split)):
-        tables.write(table, rows)
-    return len(found), count
+def _write_tables(recording: Recording, folder: Path, tables: TableWriter, keys: tuple[str, ...]) -> tuple[int, int]:
+    """Write the tables; return their number and that of their rows.
+
+    Decoding is the most work. Therefore the rows wait in a temporary file until all columns are known.
+    """
+    found = Counter[str]()
+    with TemporaryFile(dir=folder) as waiting:
+        for table, rows in _batches(FileNames(), _rows(recording, keys, splits_lists=tables.splits_lists)):
+            tables.learn(table, rows)
+            found[table] += len(rows)
+            waiting.write(msgspec.json.encode((table, rows)) + b"\n")
+        waiting.seek(0)
+        for batch in waiting:
+            tables.write(*_decode_batch(batch))
+    return len(found), found.total()
 
 
-def _commanded_rows(
+def _rows(
     recording: Recording, keys: tuple[str, ...], *, splits_lists: bool
 ) -> Iterator[tuple[Recorded, dict[str, object]]]:
     commanders = Commanders(recording.messages(TOLD_IN, newest_first=True))
-    for message in recording.messages():
+    for message in recording.messages((*keys, *TOLD_IN) if keys else ()):
         commanders.take(message)
         if not keys or is_meant(message.key, keys):
             yield message, row_of(message, commanders.of(message), splits_lists=splits_lists)
@@ -146,5 +159,4 @@ def _batches(
 
 def _size(row: Mapping[str, object]) -> int:
     """Return roughly how many bytes a row takes in memory."""
-    long = (value for value in row.values() if isinstance(value, str | bytes | list))
-    return COLUMN_BYTES * len(row) + sum(map(len, long))
+    return COLUMN_BYTES * len(row) + sum([len(value) for value in row.values() if isinstance(value, _LONG)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from backbone.keys import Conversation, address_of
@@ -65,24 +65,32 @@ def row_of(message: Recorded, commanded_by: str = "", *, splits_lists: bool = Tr
         "cause": message.cause,
         "commanded_by": commanded_by,
     }
-    for path, value in _flat(message.body, "", splits_lists=splits_lists):
-        row[f"{path}_" if path in row else path] = value
+    match message.body:
+        case dict(fields):
+            _fill(row, fields.items(), "", splits_lists=splits_lists)
+        case list(items) if splits_lists:
+            if len(items) <= LONGEST_LIST:
+                _fill(row, enumerate(items), "", splits_lists=splits_lists)
+        case bytes(unread):
+            row["bytes"] = unread.hex()
+        case value:
+            row["body"] = value
     return row
 
 
-def _flat(value: Any, path: str, *, splits_lists: bool) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict):
-        for name, inner in value.items():
-            if name != BYTES_OF:
-                yield from _flat(inner, f"{path}.{name}" if path else name, splits_lists=splits_lists)
-    elif isinstance(value, list) and splits_lists:
-        if len(value) <= LONGEST_LIST:
-            for place, inner in enumerate(value):
-                yield from _flat(inner, f"{path}.{place}" if path else str(place), splits_lists=splits_lists)
-    elif isinstance(value, bytes):
-        yield path or "bytes", value.hex()
-    else:
-        yield path or "body", value
+def _fill(row: dict[str, Any], parts: Iterable[tuple[object, Any]], before: str, *, splits_lists: bool) -> None:
+    """Add the values inside another one, each below its name; where its column is taken, it gets another one."""
+    for name, value in parts:
+        column = f"{before}{name}"
+        if name == BYTES_OF:
+            continue
+        if isinstance(value, dict):
+            _fill(row, value.items(), f"{column}.", splits_lists=splits_lists)
+        elif isinstance(value, list) and splits_lists:
+            if len(value) <= LONGEST_LIST:
+                _fill(row, enumerate(value), f"{column}.", splits_lists=splits_lists)
+        else:
+            row[f"{column}_" if column in row else column] = value
 
 
 class Commanders:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pyarrow import parquet
@@ -21,6 +24,7 @@ from backbone.launcher.endings import ExitCode
 from backbone.rc_manager.messages import Connect
 from backbone.recording.parquet_tables import ParquetTables
 from backbone.recording.reader import Recording
+from backbone.recording.tables import row_of
 from backbone.scheduling.requests import RcUse, RequestState
 from backbone.scheduling.views import RequestView, Schedule
 from resource_pool.messages import Applied, Readings
@@ -86,6 +90,42 @@ async def test_csv_files_hold_the_same_as_text(night: Path, tmp_path: Path) -> N
     assert (applied["at_s"], applied["commanded_by"], applied["values.forward_m_s"]) == ("3.000000", "watch", "0.25")
     [schedule] = rows_of(folder / "backbone_rc_manager_schedule_Schedule.csv")
     assert schedule["requests.0.arc"] == ARC
+
+
+async def test_each_table_has_the_bytes_that_the_library_for_csv_writes(tmp_path: Path) -> None:
+    """Rows wait in a file of another form; no value may change on that way, nor may a later column be lost."""
+    numbers = [0.1, 1e22, -0.0, 5.0, 1 / 3, 2.0**53]
+    texts = ["", 'a "word"', "a,b", "two\r\nlines", "ä☃", "\u2028"]
+    said = [
+        Said(1.0 + at, SCOUT, Conversation.MOTIONS, Applied("scout1", 7, at, text, {f"x{at % 3}": number}))
+        for at, (number, text) in enumerate(zip(numbers, texts, strict=True))
+    ]
+    night, folder, expected = tmp_path / "night.mcap", tmp_path / "out", io.StringIO(newline="")
+    night.write_bytes(recorded(said).getvalue())
+    await export(night, folder, (), CsvTables, with_videos=False)
+    with night.open("rb") as file:
+        rows = [row_of(one) for one in Recording(file).messages()]
+    writer = csv.DictWriter(expected, list(dict.fromkeys(column for row in rows for column in row)))
+    writer.writeheader()
+    writer.writerows({**row, "at_s": f"{row['at_s']:.6f}"} for row in rows)
+    assert (folder / f"{APPLIED}.csv").read_bytes() == expected.getvalue().encode()
+    assert {one.name for one in folder.iterdir()} == {f"{APPLIED}.csv"}
+
+
+async def test_no_message_is_decoded_twice_except_those_that_tell_who_commands(
+    night: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Decoding is the most work of an export."""
+    read, records = Counter[str](), Recording.records
+
+    def counted(*given: Any, **named: Any) -> Iterator[Any]:
+        for one in records(*given, **named):
+            read[one[3].schema] += 1
+            yield one
+
+    monkeypatch.setattr(Recording, "records", counted)
+    await export(night, tmp_path / "out", (), CsvTables, with_videos=False)
+    assert read["Readings/1"] == ROWS_AT_ONCE + 5
 
 
 async def test_keys_that_no_message_has_are_refused_and_nothing_is_made(night: Path, tmp_path: Path) -> None:
