@@ -10,7 +10,7 @@ from backbone.command_line.unusable_file import unreadable
 from backbone.errors import Refusal
 from backbone.operating_system.ending_signals import interruptible
 from backbone.recording.hearing import is_meant
-from backbone.recording.reader import NoRecording, Recording, open_file
+from backbone.recording.reader import Recording, open_file
 
 
 class NothingSelected(Refusal):
@@ -33,11 +33,7 @@ def opened(path: Path) -> Iterator[Recording]:
     except OSError as error:
         raise unreadable(path, error) from error
     with file, interruptible():
-        try:
-            recording = Recording(file)
-        except NoRecording as error:
-            raise type(error)(f"{path}: {error.detail}", remedy=error.remedy) from error
-        yield recording
+        yield Recording(file)
 
 
 def require_selected(recording: Recording, path: Path, keys: tuple[str, ...]) -> None:

@@ -118,21 +118,21 @@ class Recording:
     """
 
     def __init__(self, file: IO[bytes]) -> None:
+        self._name = name = getattr(file, "name", "the recording")
         file.seek(0)
         if file.read(len(_MAGIC)) != _MAGIC:
             why = "it begins as another kind of file" if file.tell() else "the file is empty"
-            raise NoRecording(f"no recording: {why}", remedy=NOTHING_OF_ONE)
+            raise NoRecording(f"{name}: no recording: {why}", remedy=NOTHING_OF_ONE)
         try:
             self._reader = IndexedReader(file)
             profile, summary = self._reader.get_header().profile, self._reader.get_summary()
         except (*DAMAGED, OSError) as error:
-            raise NoRecording(f"no whole recording: {error}") from error
+            raise NoRecording(f"{name}: no whole recording: {error}") from error
         if profile != PROFILE:
-            raise NotOfMessages(f"the file is of profile {profile!r}, a recording of {PROFILE!r}")
+            raise NotOfMessages(f"{name}: the file is of profile {profile!r}, a recording of {PROFILE!r}")
         if not names_all(summary):
-            raise NoRecording("the recording has no complete index")
+            raise NoRecording(f"{name}: the recording has no complete index")
         self._file, self._summary, self._places = file, summary, MessagePlaces(file, summary)
-        self._name = getattr(file, "name", "the recording")
 
     def contents(self) -> Contents:
         """Return the summary, from the index and the facts about the mission alone.

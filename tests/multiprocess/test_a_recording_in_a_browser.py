@@ -121,4 +121,5 @@ def test_what_is_no_recording_is_refused_with_a_remedy(tmp_path: Path) -> None:
         words = [str(BIN / "scout-console"), "serve", "--recording", str(tmp_path / name), "--port", "0"]
         done = subprocess.run(words, capture_output=True, text=True, timeout=WITHIN_S, check=False)
         assert done.returncode != 0
-        assert code in done.stderr
+        [line] = done.stderr.splitlines()
+        assert line.startswith(f"refused [{code}]: {tmp_path / name}"), "one line names the file"
