@@ -19,7 +19,7 @@ class TimeLine:
     Attributes:
         begin_s: Mission time of its first message.
         end_s: Mission time of its last message.
-        markers: Markers in the order of time.
+        markers: Markers in the order of time; none until they are read.
     """
 
     begin_s: float

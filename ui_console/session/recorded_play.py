@@ -18,17 +18,18 @@ from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
 from backbone.recording.known_messages import message_classes
-from backbone.recording.markers import markers_in
+from backbone.recording.markers import Marker, markers_in
 from backbone.recording.playback import Playback
 from backbone.recording.player import Player
 from backbone.recording.reader import Recording, open_file
 from backbone.recording.writer import NS
-from backbone.waiting import end_tasks, first_to_end
+from backbone.waiting import end_tasks, first_to_end, in_thread_within
 
 NEAR_S = 2.0  # chosen: a shorter step ahead is played, so that no message is left out; mission seconds
 LOOK_EACH_S = 0.1  # chosen: detects the end soon enough for a person; machine seconds
 AGAIN_EACH_S = 1.0  # chosen: a view opened during a pause gets its pictures soon; machine seconds
 STEPS_TO = tuple(f"*/{one}" for one in (Conversation.FRAMES, Conversation.LOG, Conversation.SCHEDULE))
+STILL_READ = "the markers are still being read"
 NOT_NOW = "This is a recording: nothing in it can be commanded. It can be played, and asked why."
 
 
@@ -108,8 +109,10 @@ class RecordedPlay(Generic[Console]):
         found = self._recording.contents()
         self.mission = legal((found.about.get("mission") or "recording")[:MAX_NAME_LENGTH])
         self.playback = Playback(machine, found.begin_s, found.end_s)
-        self.markers = markers_in(self._recording)
-        """The markers in the order of time."""
+        self.markers = list[Marker]()
+        """The markers in the order of time, once they are read."""
+        self.has_markers = False
+        """Whether they are read; that takes seconds, so a large recording is shown before."""
         self._is_elsewhere, self._arrived, self._ended = asyncio.Event(), asyncio.Event(), asyncio.Event()
         self._performance = self._new_performance()
 
@@ -162,7 +165,13 @@ class RecordedPlay(Generic[Console]):
             NoRecording: The recording is damaged.
             BaseException: A bug.
         """
-        await first_to_end(self._ended.wait(), self._perform_for_ever(), self._keep_to_the_end(), self._keep_saying())
+        await first_to_end(
+            self._ended.wait(),
+            self._perform_for_ever(),
+            self._keep_to_the_end(),
+            self._keep_saying(),
+            self._read_markers(),
+        )
 
     async def _perform_for_ever(self) -> None:
         await self._performance.begin()
@@ -188,6 +197,11 @@ class RecordedPlay(Generic[Console]):
         player = Player(bus, playback, recording, self.classes, since_s=since_s)
         console = self._new_console(launch, network, playback)
         return Performance(player, console, lambda: asyncio.ensure_future(bus.close()))
+
+    async def _read_markers(self) -> None:
+        self.markers += await in_thread_within(lambda: markers_in(self.reopened()), None)
+        self.has_markers = True
+        await asyncio.Event().wait()
 
     async def _keep_to_the_end(self) -> None:
         while True:

@@ -18,7 +18,7 @@ from backbone.recording.playback import NoSuchTime, Playback
 from ui_console.model.profile import Profile
 from ui_console.model.time_line import TimeLine, next_speed
 from ui_console.model.views import ConsoleView
-from ui_console.session.recorded_play import NOT_NOW
+from ui_console.session.recorded_play import NOT_NOW, STILL_READ
 from ui_console.session.verbs import Session
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.dialogs import ChoiceDialog, DialogChoice, LineQuestion, Reading
@@ -42,6 +42,7 @@ class RecordingPlayer(Protocol):
 
     playback: Playback
     mission: str
+    has_markers: bool
 
     def play(self, speed: float) -> None:
         """Play."""
@@ -198,7 +199,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
         margin_s = PLAY_ON_S * playback.rate if playback.is_playing else 0.0
         found = self._line.after(self._at_s) if steps > 0 else self._line.before(self._at_s - margin_s)
         if found is None:
-            self.notify("no further marker", severity="warning")
+            self.notify("no further marker" if self._play.has_markers else STILL_READ, severity="warning")
         else:
             self._go_to(found.at_s)
 
@@ -207,7 +208,8 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
         if self._line.markers:
             self._open(marker_dialog(self._line, self._at_s), self._go_to)
         else:
-            self.notify("nothing is marked: no grant, no alarm, no action of a person", severity="warning")
+            nothing = "nothing is marked: no grant, no alarm, no action of a person"
+            self.notify(nothing if self._play.has_markers else STILL_READ, severity="warning")
 
     def action_go_to(self) -> None:
         """Go to a typed time."""

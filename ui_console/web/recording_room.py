@@ -92,14 +92,13 @@ class RecordingRoom:
         self.play: RecordedPlay[RecordedHub] = RecordedPlay(opened, machine, f"web-{os.getpid()}", new_hub)
         self.play.moved = self._take_along
         self._hub = self.play.console
-        self._markers = msgspec.json.encode(self.play.markers)
+        self._markers: bytes | None = None
         self.clients: dict[Viewer, None] = {}
 
     def enter(self, welcome: Welcome) -> Viewer:
         """Return a new viewer, whose page gets the whole view."""
         viewer = Viewer(self._hub.enter(welcome))
         self.clients[viewer] = None
-        viewer.put("markers", self._markers)
         self._tell([viewer])
         return viewer
 
@@ -168,5 +167,9 @@ class RecordingRoom:
                 playback.begin_s, playback.end_s, round(playback.now_s(), 3), playback.is_playing, playback.rate
             )
         )
+        if self._markers is None and self.play.has_markers:
+            self._markers = msgspec.json.encode(self.play.markers)
         for viewer in viewers:
             viewer.put("playback", body)
+            if self._markers is not None:
+                viewer.put("markers", self._markers)

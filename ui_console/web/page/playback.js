@@ -33,8 +33,8 @@ export class Playback {
     this.act = act;
     /** @type {PlaybackView | null} */
     this.now = null;
-    /** @type {Marker[]} */
-    this.markers = [];
+    /** @type {Marker[] | null} */
+    this.markers = null; // until they are read from the recording
     /** @type {Marker | null} */
     this.told = null;
     this.isDragged = false;
@@ -87,8 +87,9 @@ export class Playback {
 
   /** @param {1 | -1} way */
   goToNext(way) {
-    const marker = nextMarker(this.markers, this.now?.at_s ?? 0, way);
+    const marker = nextMarker(this.markers ?? [], this.now?.at_s ?? 0, way);
     if (marker) this.goTo(marker);
+    else if (this.markers === null) set(find("play-told"), "the markers are still being read");
     else set(find("play-told"), way === 1 ? "nothing is marked later" : "nothing is marked earlier");
   }
 
