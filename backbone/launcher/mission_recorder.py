@@ -67,8 +67,11 @@ def require_writable(path: Path) -> None:
     Raises:
         RecorderFailed: This user may not, or there is no such folder.
     """
-    if not os.access(path.absolute().parent, os.W_OK):
-        raise RecorderFailed(f"{path.absolute().parent} cannot be written")
+    folder = path.absolute().parent
+    if not folder.is_dir():
+        raise RecorderFailed(f"there is no folder {folder}")
+    if not os.access(folder, os.W_OK):
+        raise RecorderFailed(f"{folder} cannot be written")
 
 
 def first_free(path: Path) -> Path:

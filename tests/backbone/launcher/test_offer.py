@@ -273,7 +273,7 @@ async def test_a_machine_whose_recorder_does_not_begin_in_time_is_offered_and_re
 
 
 async def test_a_machine_whose_recording_cannot_be_written_is_not_offered(tmp_path: Path) -> None:
-    with pytest.raises(RecorderFailed, match="cannot be written"):
+    with pytest.raises(RecorderFailed, match="there is no folder"):
         await offer_this_machine("night", "unixsock-stream/nowhere", None, "far", (), tmp_path / "no" / "far.mcap")
 
 
