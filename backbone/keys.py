@@ -134,6 +134,17 @@ def listened_to(token: str) -> str:
     return token.rsplit("/", 2)[0].replace(_ANY, "*")
 
 
+def is_key(text: str) -> bool:
+    """Return whether the text has the parts of a concrete key, so that ``address_of`` can be asked.
+
+    Example:
+        >>> is_key("scout/iros2001/resource_pool/scout1/ask"), is_key("/camera/image")
+        (True, False)
+    """
+    root, *others = text.split("/")
+    return root == ROOT and len(others) > 2
+
+
 def address_of(key_expression: str) -> str:
     """Return the address in a concrete key.
 

@@ -18,6 +18,7 @@ from mcap.stream_reader import CRCValidationError
 from zstandard import ZstdError
 
 from backbone.errors import Refusal
+from backbone.keys import is_key
 from backbone.recording.chunks import messages_in
 from backbone.recording.file_index import IndexedReader, MessagePlace, MessagePlaces, names_all
 from backbone.recording.hearing import is_meant
@@ -132,6 +133,9 @@ class Recording:
             raise NotOfMessages(f"{name}: the file is of profile {profile!r}, a recording of {PROFILE!r}")
         if not names_all(summary):
             raise NoRecording(f"{name}: the recording has no complete index")
+        for key, _source, _schema in map(_named, summary.channels.values()):
+            if key and not is_key(key):
+                raise NotOfMessages(f"{name}: {key!r} is no key of a bus")
         self._file, self._summary, self._places = file, summary, MessagePlaces(file, summary)
 
     def contents(self) -> Contents:
@@ -301,7 +305,8 @@ def _recorded(channel: Channel, message: Message) -> Recorded:
     try:
         found = Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)
     except TypeError as error:
-        raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: {error}") from error
+        why = "it is no object with stamp_s, heard_s, sequence, cause and body"
+        raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: {why}") from error
     if not (
         isinstance(found.stamp_s, _NUMBER)
         and isinstance(found.heard_s, _NUMBER)

@@ -299,10 +299,20 @@ NO_SOURCE = UNNUMBERED.replace(b'"soon"', b'1.0,"source":null')
 
 @pytest.mark.parametrize("data", [b"{}", b"7", b'{"x": 1}', b"[]", UNNUMBERED, NO_KEY, NO_SOURCE])
 def test_messages_of_another_form_are_refused(data: bytes) -> None:
-    file = foreign(PROFILE, data)
+    file = foreign(PROFILE, data, {"key": "scout/night/x/y/log"})
     file.name = "other.mcap"
-    with pytest.raises(NotOfMessages, match=r"^other\.mcap: the message at 0.000 s in /t is none of a bus: "):
+    with pytest.raises(
+        NotOfMessages, match=r"^other\.mcap: the message at 0.000 s in /t is none of a bus: it "
+    ) as told:
         [*Recording(file).messages()]
+    assert "__init__" not in told.value.detail
+
+
+@pytest.mark.parametrize("about", [{}, {"key": "camera"}, {"key": "scout/night/log"}, {"key": "a/b/c/d"}])
+def test_a_file_whose_keys_are_none_of_a_bus_is_refused_when_it_is_opened(about: dict[str, str]) -> None:
+    """A player would ask for the address in such a key, and there is none."""
+    with pytest.raises(NotOfMessages, match="is no key of a bus"):
+        Recording(foreign(PROFILE, b"{}", about))
 
 
 @pytest.mark.parametrize("profile", ["", "ros1", "ros2", "px4"])
@@ -311,11 +321,11 @@ def test_a_file_of_another_program_is_not_recovered(profile: str) -> None:
         recover(foreign(profile, b"{}"), io.BytesIO())
 
 
-def foreign(profile: str, data: bytes) -> io.BytesIO:
+def foreign(profile: str, data: bytes, about: dict[str, str] | None = None) -> io.BytesIO:
     """Return another program's MCAP file, of this profile, with one JSON message."""
     file = io.BytesIO()
     made = Writer(file)
     made.start(profile=profile)
-    made.add_message(made.register_channel("/t", "json", 0), 0, data, 0)
+    made.add_message(made.register_channel("/t", "json", 0, about or {}), 0, data, 0)
     made.finish()
     return file
