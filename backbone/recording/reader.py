@@ -28,7 +28,6 @@ from backbone.recording.writer import ABOUT, NS, PROFILE
 MOST_LEVELS = 850  # chosen: Python's limit of 1000 calls, less six times the calls that lead to its loop
 NOTHING_OF_ONE = "Name a recording; this file has nothing of one."
 DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
-_NUMBER = int, float
 _END_NS = 2**64  # MCAP specification: a time is a uint64
 _MAGIC = b"\x89MCAP0\r\n"  # MCAP specification: the begin of every file
 
@@ -307,14 +306,8 @@ def _recorded(channel: Channel, message: Message) -> Recorded:
     except TypeError as error:
         why = "it is no object with stamp_s, heard_s, sequence, cause and body"
         raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: {why}") from error
-    if not (
-        isinstance(found.stamp_s, _NUMBER)
-        and isinstance(found.heard_s, _NUMBER)
-        and isinstance(found.sequence, _NUMBER)
-        and isinstance(found.key, str)
-        and isinstance(found.source, str)
-        and isinstance(found.cause, str)
-    ):
+    numbers, texts = (found.stamp_s, found.heard_s, found.sequence), (found.key, found.source, found.cause)
+    if not (all(isinstance(one, int | float) for one in numbers) and all(isinstance(one, str) for one in texts)):
         why = "it has no numbers or no texts where a message has them"
         raise NotOfMessages(f"the message at {at_s:.3f} s in {channel.topic} is none of a bus: {why}")
     return found
