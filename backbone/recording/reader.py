@@ -119,9 +119,7 @@ class Recording:
 
     def __init__(self, file: IO[bytes]) -> None:
         self._name = name = getattr(file, "name", "the recording")
-        file.seek(0)
-        if file.read(len(_MAGIC)) != _MAGIC:
-            why = "it begins as another kind of file" if file.tell() else "the file is empty"
+        if why := wrong_begin(file):
             raise NoRecording(f"{name}: no recording: {why}", remedy=NOTHING_OF_ONE)
         try:
             self._reader = IndexedReader(file)
@@ -253,6 +251,14 @@ def _refusing_damage(name: object) -> Iterator[None]:
         raise NotOfMessages(f"{name}: {error.detail}") from error
     except DAMAGED as error:
         raise NoRecording(f"{name} is damaged: {error}") from error
+
+
+def wrong_begin(file: IO[bytes]) -> str:
+    """Return why the file cannot be a recording, by its first bytes; empty: it may be one."""
+    file.seek(0)
+    if file.read(len(_MAGIC)) == _MAGIC:
+        return ""
+    return "it begins as another kind of file" if file.tell() else "the file is empty"
 
 
 def open_file(path: Path) -> IO[bytes]:

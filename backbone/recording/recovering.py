@@ -31,6 +31,7 @@ from backbone.recording.reader import (
     NoRecording,
     NotOfMessages,
     open_file,
+    wrong_begin,
 )
 from backbone.recording.writer import PROFILE, begun_writer
 
@@ -100,6 +101,8 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
         lost = _take_by_index(whole, damaged, index)
         whole.finish()
         return Recovered(whole.messages, lost, 0)
+    if why := wrong_begin(damaged):
+        raise NoRecording(f"no recording: {why}", remedy=NOTHING_OF_ONE)
     read_to = damaged.seek(0)
     try:
         for record in _each_record(damaged):
@@ -114,8 +117,7 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
         read_to = damaged.tell()  # also after the footer and the magic
     except DAMAGED as error:
         if not has_begun:
-            why = str(error) or "it is too short"
-            raise NoRecording(f"no recording: {why}", remedy=NOTHING_OF_ONE) from error
+            raise NoRecording("no recording: its first record is cut or damaged", remedy=NOTHING_OF_ONE) from error
         read_to = damaged.seek(0, os.SEEK_END) if has_all else read_to  # the index follows; it is written again
     whole.finish()
     size = damaged.seek(0, os.SEEK_END)  # only now: its recorder may still write it

@@ -125,10 +125,14 @@ def test_of_a_damaged_file_facts_and_mission_file_are_read_or_refused(data: st.D
             read_part(Recording(io.BytesIO(broken)))
 
 
-@pytest.mark.parametrize("data", [b"", b"RIFF" * 100, bytes(1000)])
-def test_what_is_no_recording_is_refused_with_a_remedy(data: bytes) -> None:
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [(b"", "is empty"), (b"hello", "another kind"), (b"RIFF" * 100, "another kind"), (bytes(1000), "another kind")],
+    ids=["empty", "short", "RIFF", "zeros"],
+)
+def test_what_is_no_recording_is_refused_with_a_remedy(data: bytes, why: str) -> None:
     for use in (Recording, lambda file: recover(file, io.BytesIO())):
-        with pytest.raises(NoRecording, match="no recording") as refused:
+        with pytest.raises(NoRecording, match=f"no recording: .*{why}") as refused:
             use(io.BytesIO(data))
         assert "recover" not in refused.value.remedy, "recovering it is refused as well"
 
