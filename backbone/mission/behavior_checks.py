@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from backbone.component.abilities import NO_ABILITIES
 from backbone.mission.behavior_orders import TREE_PARAMETERS
-from backbone.mission.class_facts import ANY_ARC
+from backbone.mission.class_facts import ANY_ARC, ClassFacts
 from backbone.mission.document import Element
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.reading_checks import check_named, check_readings
 from backbone.mission.report import Report, listed
-from backbone.mission.tables import Tables, check_multiplicity, check_parameters, check_unique, is_known
+from backbone.mission.tables import (
+    Tables,
+    check_multiplicity,
+    check_parameters,
+    check_unique,
+    is_known,
+    parameter_value,
+)
 from backbone.naming import Subsystem
 from backbone.scheduling.run_times import SHORTEST_RUNTIME_S
 from backbone.spoken import counted
@@ -70,6 +77,7 @@ def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
         return
     (fewest, most), given = facts.children, behavior.all("behavior")
     if fewest <= len(given) <= most:
+        _check_counts(behavior, facts, report)
         return
     wanted = "none" if most == 0 else "exactly one" if fewest == most == 1 else f"at least {fewest}"
     report.fault(
@@ -77,6 +85,20 @@ def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
         f"{behavior.text('type')} {behavior.text('name')} has {counted(len(given), 'behavior')} inside",
         f"Give it {wanted}",
     )
+
+
+def _check_counts(behavior: Element, facts: ClassFacts, report: Report) -> None:
+    """Report numbers of children that are never reached, because the behavior has fewer."""
+    counts = {one.name: one for one in facts.parameters if one.schema.get("counts") == "children"}
+    there = len(behavior.all("behavior"))
+    for parameter in behavior.all("parameter"):
+        one, value = counts.get(parameter.text("name")), parameter_value(parameter.text("value"))
+        if one is not None and isinstance(value, int) and value > there and one.accepts(value):
+            report.fault(
+                parameter.place_of("value"),
+                f"{one.name} is {value}, but {behavior.text('name')} has {counted(there, 'behavior')} inside",
+                f"Write at most {there}, or -1 for all",
+            )
 
 
 def _check_needed(behavior: Element, needed: str, tables: Tables, report: Report) -> None:

@@ -30,8 +30,8 @@ Pause = Annotated[float, msgspec.Meta(ge=0, le=A_DAY_S)]
 """A finite duration in mission time, or 0."""
 Times = Annotated[int, msgspec.Meta(ge=ENDLESS, le=MOST_TIMES)]
 """A number of repetitions, or without end."""
-Threshold = Annotated[int, msgspec.Meta(ge=-MOST_CHILDREN, le=MOST_CHILDREN)]
-"""A number of children; negative: counted from the number of all children, -1 being all."""
+Threshold = Annotated[int, msgspec.Meta(ge=-MOST_CHILDREN, le=MOST_CHILDREN, extra_json_schema={"counts": "children"})]
+"""A number of children, at most all of them; negative: counted from the number of all children, -1 being all."""
 
 _SETTINGS = {"num_cycles": "most", "num_attempts": "most"}  # parameter → setting of the rules, if the names differ
 
