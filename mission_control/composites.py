@@ -197,12 +197,13 @@ class Again(Composite):
     ) -> None:
         super().__init__(names, while_suspended=while_suspended, patience_s=patience_s)
         self.most, self.pause_s = most, pause_s
-        self._ends, self._starts_at_s = 0, -math.inf
+        self._ends, self._starts_at_s, self._why_again = 0, -math.inf, ""
 
     def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
-        """Record a report; count the ends."""
+        """Record a report; count the ends, and keep the reason, because the next start has reports of its own."""
         has_finished = super().reported(name, status, payload)
-        self._ends += has_finished
+        if has_finished:
+            self._ends, self._why_again = self._ends + 1, self.why_failed(name)
         return has_finished
 
     def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
@@ -242,7 +243,7 @@ class Again(Composite):
     def _because(self) -> str:
         turn = f", {self._turn} {self._ends + 1}" + ("" if self.most < 0 else f" of {self.most}")
         failed = self._ends and self.again_after is BehaviorStatus.FAILURE
-        return turn + (f", because {self.why_failed(self._open[0])}" if failed else "")
+        return turn + (f", because {self._why_again}" if failed else "")
 
     @property
     def _turn(self) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from begun_children import FAIL, FAILURE, NAMES, SKIP, SUCCESS, begun, end
+from begun_children import FAIL, FAILURE, NAMES, RUNNING, SKIP, SUCCESS, begun, end
 from composed_trees import LONGEST, ByEvents, Plan, decide, impatient_trees, trees
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
@@ -320,6 +320,7 @@ def test_a_setting_can_be_changed_on_the_way() -> None:
 def test_retry_and_repeat_say_which_turn_it_is() -> None:
     retry = begun(WithRetries(["a"], most=3))
     end(retry, "a", FAILURE, detail="no path")
+    retry.reported("a", RUNNING, {})
     assert retry.sentence == "runs a, attempt 2 of 3, because a failed: no path"
     repeat = begun(WithRepeats(["a"], most=-1))
     end(repeat, "a", SUCCESS)
