@@ -36,6 +36,7 @@ class ChildKeeper:
         self,
         parent: BehaviorOfParts,
         reported: Callable[[str, BehaviorStatus, Mapping[str, object], str], None],
+        fell: Callable[[str, str], None],
         left: Callable[[str], None],
     ) -> None:
         """Create a keeper without children.
@@ -43,9 +44,10 @@ class ChildKeeper:
         Args:
             reported: Called with a child's status, payload and reason of suspension when it finished, cannot run or was
                 adopted.
+            fell: Called with a child and how its process ended, when its creator restarts it.
             left: Called when an order stopped a child.
         """
-        self._parent, self._reported, self._left = parent, reported, left
+        self._parent, self._reported, self._fell, self._left = parent, reported, fell, left
         self._bus, self._clock, self._nodes = parent.bus, parent.clock, parent.child_nodes
         self._kept: dict[str, asyncio.Task[None]] = {}
         self._wishes: dict[str, Wish] = {}
@@ -156,9 +158,13 @@ class ChildKeeper:
 
     def _heard_fall(self, envelope: Envelope[ProcessFell]) -> None:
         fell = envelope.body
-        if fell.name in self._nodes and fell.failing:
+        if fell.name not in self._nodes:
+            return
+        if fell.failing:
             fell_too_often = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
             self._reported(fell.name, BehaviorStatus.FAILURE, fell_too_often, "")
+        else:
+            self._fell(fell.name, fell.how)
 
 
 async def end_by_placer(bus: Bus, clock: Clock, name: str, reason: str) -> None:

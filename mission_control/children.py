@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import ClassVar
 
-from backbone.spoken import value_text
+from backbone.spoken import counted, value_text
 from mission_control.messages import BehaviorStatus
 
 
@@ -98,6 +98,7 @@ class Children:
         self.status: dict[str, BehaviorStatus] = {}
         self.payload: dict[str, Mapping[str, object]] = {}
         self.suspensions: dict[str, Suspension] = {}
+        self._falls = dict[str, tuple[int, str]]()  # child → ends of its process in this run, and the last one
 
     def decision(self, name: str) -> Decision:
         """Return the decision on a finished child: by default a failure aborts, a success continues."""
@@ -156,6 +157,11 @@ class Children:
         if status.is_final:
             self.suspensions.pop(name, None)
         return status.is_final
+
+    def fell(self, name: str, how: str) -> None:
+        """Record that the process of a running child ended and is restarted; this is not a failure of the child."""
+        if name in self._running and not self.status[name].is_final:
+            self._falls[name] = (self._falls[name][0] + 1, how)
 
     def decided(self, name: str, decision: Decision, now_s: float) -> list[Instruction]:
         """Return the instructions after the parent's decision about a finished child."""
@@ -251,8 +257,14 @@ class Children:
     def _remark(self, name: str) -> str:
         if name in self.suspensions:
             return f"suspended: {self.suspensions[name].because}"
-        is_ended = self.has_finished and not self.status[name].is_final
-        return "ended" if is_ended else str(self.status[name])
+        if self.status[name].is_final:
+            return str(self.status[name])
+        return "ended" if self.has_finished else ", ".join(filter(None, (self.status[name], self._restarts(name))))
+
+    def _restarts(self, name: str) -> str:
+        """Return the restarts of a running child as the end of a sentence; empty: there was none."""
+        number, how = self._falls[name]
+        return f"restarted {counted(number, 'time')}, last after {how}" if number else ""
 
     def _with_status(self, status: BehaviorStatus) -> list[str]:
         return [name for name in self._names if self.status.get(name) is status]
@@ -273,6 +285,7 @@ class Children:
             self.suspensions.pop(name, None)
         self._running += starting
         self.status |= dict.fromkeys(starting, BehaviorStatus.RUNNING)
+        self._falls |= dict.fromkeys(starting, (0, ""))
         return [*map(StopChild, stopping), *map(StartChild, starting)]
 
     def _finish(self, finish: FinishParent) -> list[Instruction]:

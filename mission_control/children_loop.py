@@ -36,7 +36,7 @@ class ChildrenLoop:
         self.rules = rules
         """The state of the children."""
         self._parent, self._clock, self._nodes = parent, parent.clock, parent.child_nodes
-        self._keeper = ChildKeeper(parent, self.reported, self._child_left)
+        self._keeper = ChildKeeper(parent, self.reported, self._child_fell, self._child_left)
         self._given_up: dict[str, Absence] = {}
         self._last_orders: dict[str, asyncio.Event] = {}
         self._waking: asyncio.Task[None] | None = None
@@ -100,6 +100,10 @@ class ChildrenLoop:
             cause = str(payload.get("detail", "it failed"))
             self._given_up[name] = Absence(name, self._clock.now_s(), cause, remedy=remedy)
             self._parent.changed()
+
+    def _child_fell(self, name: str, how: str) -> None:
+        self.rules.fell(name, how)
+        self._parent.rules_applied()
 
     def _child_left(self, name: str) -> None:
         self._carry_out(self.rules.left(name, self._now_s()))

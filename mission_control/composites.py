@@ -90,7 +90,8 @@ class Composite(Children):
             return ""
         working = [name for name in self._running if name not in self.suspensions]
         runs = f"runs {' and '.join(working)}" if working else f"waits ({self.suspended_because})"
-        return runs + self._because()
+        restarts = "".join(f"; {name} was {told}" for name in self._running if (told := self._restarts(name)))
+        return runs + self._because() + restarts
 
     def remarks(self) -> dict[str, str]:
         """Return node → its state, also of children that are not started; see ``Children.remarks``."""

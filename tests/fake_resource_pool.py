@@ -221,9 +221,9 @@ class FakePlacer:
         """Forget it, as a placer does that died together with the component's creator."""
         del self.placed[name]
 
-    def fall_often(self, name: str) -> None:
-        """Say what a creator says of a component that fell too often."""
-        fell = ProcessFell(name, "signal 9", 10.0, [], failing=True)
+    def fall(self, name: str, how: str = "signal 9", *, often: bool = False) -> None:
+        """Say what a creator says of a component that fell and is restarted, or that fell too often."""
+        fell = ProcessFell(name, how, 10.0 if often else 0.1, [], failing=often)
         self.creator.publish("backbone/creator-local", Conversation.EVENTS, fell)
 
     async def wait(self, condition: Callable[[], Any], within_s: float = 90.0) -> None:

@@ -120,7 +120,7 @@ def test_a_child_that_falls_too_often_counts_as_failed(placer_world: Run) -> Non
         await placer.wait(lambda: "leaf" in placer.components)
         await placer.clock.sleep_s(0.1)
         await placer.kill("leaf")
-        placer.fall_often("leaf")
+        placer.fall("leaf", often=True)
         await placer.wait(lambda: top.status is BehaviorStatus.FAILURE)
         assert top.payload["code"] == "child.given_up"
 

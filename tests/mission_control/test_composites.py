@@ -132,7 +132,7 @@ MAKERS: dict[str, Callable[[], Children]] = {
     "timeout-count": lambda: WithTimeout(["a"], seconds=7.0, while_suspended=WhileSuspended.COUNT),
     "wait": lambda: WithDelay([], seconds=7.0),
 }
-_kinds = ["success", "failure", "running", "suspended", "resumed", "left", "time", "end", "rearranged", "rearranged"]
+_kinds = ["success", "failure", "running", "suspended", "resumed", "fell", "left", "time", "end", *["rearranged"] * 2]
 _children = st.lists(st.sampled_from([*NAMES, "d"]), unique=True)
 _events = st.lists(
     st.tuples(st.sampled_from(NAMES), st.sampled_from(_kinds), st.floats(0.0, 3.0), _children),
@@ -184,6 +184,8 @@ def test_whatever_happens_children_run_once_and_none_after_the_end(
                     watched.carry_out(decide(rules, name, now))
             case "suspended" | "resumed":
                 watched.carry_out(rules.suspended(name, "slice" if event == "suspended" else "", now))
+            case "fell":
+                rules.fell(name, "signal 9")
             case "left":
                 instructions = rules.left(name, now)
                 watched.running.discard(name)

@@ -184,6 +184,30 @@ def test_a_retry_and_a_repeat_start_their_child_as_often_as_they_are_told(placer
     placer_world(scene)
 
 
+def test_the_fall_of_a_child_is_no_attempt_and_its_parent_shows_the_restarts(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        top = await root(placer, node("retry", "try", node("leaf", "a"), num_attempts=2))
+        await placer.clock.sleep_s(0.1)
+        for how in ("signal 9", "exit code 1: ValueError: boom"):
+            await placer.kill("a")
+            placer.fall("a", how)
+            await placer.restart("a")
+        restarts = "restarted 2 times, last after exit code 1: ValueError: boom"
+        await placer.wait(lambda: top.feedback == f"runs a, attempt 1 of 2; a was {restarts}")
+        assert (await tree_of(placer, "try"))[-1] == f"└─ a (leaf, priority 3): running, {restarts}"
+        await placer.kill("a")
+        placer.fall("a", "exit code 1: ValueError: boom", often=True)
+        await placer.wait(lambda: is_running(placer, "try", "a"))
+        await placer.wait(
+            lambda: (
+                top.feedback == "runs a, attempt 2 of 2, because a failed: "
+                "a fell too often: exit code 1: ValueError: boom"
+            )
+        )
+
+    placer_world(scene)
+
+
 def test_a_child_that_cannot_start_is_a_failure_like_others(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         placer.refusals["drive"] = NoHost("no host has tag radio")
