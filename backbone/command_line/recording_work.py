@@ -22,6 +22,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.command_line.connection import REPLY_TIME_S
 from backbone.command_line.joining import clock_lines, clocks_json
+from backbone.command_line.key_patterns import check_patterns
 from backbone.command_line.message_lines import message_json, message_line
 from backbone.command_line.opened_recording import opened
 from backbone.command_line.options import DISTRIBUTION
@@ -95,9 +96,14 @@ class OfLauncher:
 async def record_to(
     where: Where, to: Path | None, keys: list[str], for_s: float | None, splitting: Splitting, told: OfLauncher
 ) -> ExitCode:
-    """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended."""
+    """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended.
+
+    Raises:
+        ImpossiblePattern: No key of this mission can match a pattern.
+    """
     own = address_of_recorder()
     async with mission_connection.connected(where.mission, where.connect, own, where.secret()) as (bus, clock):
+        check_patterns(keys, bus.mission)
         path = to or Path(f"{bus.mission}-{datetime.now():%Y%m%d-%H%M%S}.mcap")
         if told.is_described:
             said = json.load(sys.stdin)

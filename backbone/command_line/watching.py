@@ -15,6 +15,7 @@ from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Overhearing
 from backbone.command_line.connection import REPLY_TIME_S, connected
 from backbone.command_line.key_facts import TrafficRow, ask_facts, with_facts
+from backbone.command_line.key_patterns import check_patterns
 from backbone.command_line.line_printer import LinePrinter
 from backbone.command_line.listening import until_ended
 from backbone.command_line.message_lines import (
@@ -207,7 +208,11 @@ async def overhearing(
         heard: Called in the event loop.
         classes: Message classes by schema; None: the mission's classes.
         of: Address of the component; empty: any.
+
+    Raises:
+        ImpossiblePattern: No key of this mission can match a pattern.
     """
+    check_patterns(keys, bus.mission)
     hearing = Hearing(await mission_classes(bus) if classes is None else classes, keys)
 
     def came(key: str, raw: bytes) -> None:

@@ -36,7 +36,7 @@ def test_what_is_said_is_watched_live_with_questions_and_single_fields(mission: 
     assert all(isinstance(one["value"], float) for one in places)
     asked = printed(mission, "watch", "*/scout1/ask", "--for", "3")
     assert {"Move/1", "Applied/1"} <= {one["schema"] for one in asked}
-    done = mission.command("scout-backbone", "watch", "nobody/*", "--for", "1", "--mission", mission.name)
+    done = mission.command("scout-backbone", "watch", "*/nobody/*", "--for", "1", "--mission", mission.name)
     assert (done.returncode, done.stdout) == (0, "")
 
 

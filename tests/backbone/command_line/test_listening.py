@@ -220,7 +220,7 @@ def test_who_watches_is_told_of_an_absence_of_the_hub(
     ("keys", "told"),
     [
         ((), "no message came"),
-        (("a//b", "*/[c"), "no message came at a//b or */[c; 'scout-backbone top' shows all keys"),
+        (("*/a/log", "*[bc]"), "no message came at */a/log or *[bc]; 'scout-backbone top' shows all keys"),
     ],
 )
 @pytest.mark.parametrize("command", [watching.watch, partial(watching.top, once=True)], ids=["watch", "top"])
