@@ -215,6 +215,10 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         life = super().run()
         await (self.exchanges.run(life) if self.gate.is_first else life)
 
+    async def leave_bus(self) -> None:
+        """Withdraw all declarations of this implementation; see ``Component.leave_bus``."""
+        await self.gate.withdraw()
+
     def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         """Run the coroutine beside ``serve``; an exit of a class that has replaced another one is its bug."""
         if self.gate.is_first:
@@ -321,9 +325,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     def absences(self) -> list[Absence]:
         """Return the missing children and ARC, and the children that are given up."""
-        of_children = self._children.absences(has_finished=self.status.is_final)
-        arc = self.own_arc.absence()
-        return of_children if arc is None or self.status.is_final else [arc, *of_children]
+        arc = None if self.status.is_final else self.own_arc.absence()
+        return [*([] if arc is None else [arc]), *self._children.absences(has_finished=self.status.is_final)]
 
     def statistics(self) -> dict[str, float]:
         """Return counts of grants and pictures."""

@@ -234,6 +234,16 @@ class GatedBus:
         return self.bus.dropped()
 
     async def close(self) -> None:
+        """Refuse: a behavior without its declarations would stay ready and receive nothing.
+
+        Raises:
+            RuntimeError: Always.
+        """
+        raise RuntimeError(
+            "only the end of a behavior closes its bus; write self.end(reason), or close what subscribe returned"
+        )
+
+    async def withdraw(self) -> None:
         """Withdraw all declarations of this implementation; the component's bus stays open."""
         for heard in list(self._heard):
             heard.close()

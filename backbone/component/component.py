@@ -314,9 +314,13 @@ class Component(Generic[P_co]):
             if await self._unless_ended(self._claim_name(), "claim"):
                 await self._live_and_report_end()
         finally:
-            await self.bus.close()
+            await self.leave_bus()
         if self._bug is not None:
             raise self._bug
+
+    async def leave_bus(self) -> None:
+        """Withdraw all declarations of the component."""
+        await self.bus.close()
 
     async def _claim_name(self) -> None:
         if self.registers and (stop := await claim_name(self.bus, self.clock, self.component_state())) is not None:

@@ -105,6 +105,13 @@ class Canceller(Behavior[Any]):
         await self.clock.sleep_s(0.1)
 
 
+class Closer(Behavior[Any]):
+    """Closes its bus."""
+
+    async def act(self) -> None:
+        await self.bus.close()
+
+
 class Forgetful(Behavior[Any]):
     """Returns without ``finish``."""
 
@@ -139,6 +146,7 @@ CLASSES: dict[str, type[Component[Any]]] = {
     "starter": Starter,
     "stubborn": Stubborn,
     "canceller": Canceller,
+    "closer": Closer,
     "forgetful": Forgetful,
     "seer": Seer,
     "finisher": Finisher,

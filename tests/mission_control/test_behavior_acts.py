@@ -211,6 +211,19 @@ def test_an_act_that_cancels_itself_is_a_bug_with_its_place(placer_world: Run) -
     placer_world(scene)
 
 
+def test_an_act_that_closes_its_bus_is_a_bug(placer_world: Run) -> None:
+    """Otherwise the behavior stays ready and hears nothing."""
+
+    async def scene(placer: FakePlacer) -> None:
+        own = await root(placer, node("own", "closer", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        await placer.arcs["own-capture"].grant()
+        await placer.wait(lambda: own.state is LifeState.FAILED)
+        assert own.feedback.startswith("RuntimeError: only the end of a behavior closes its bus; ")
+
+    placer_world(scene)
+
+
 @pytest.mark.parametrize(("kind", "is_told"), [("forgetful", True), ("seer", False), ("finisher", False)])
 def test_an_act_that_returns_without_finish_is_told(placer_world: Run, kind: str, is_told: bool) -> None:
     """Otherwise the behavior keeps its robot for no visible reason."""
