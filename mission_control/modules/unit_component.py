@@ -32,6 +32,7 @@ from mission_control.modules.arrangement import judged
 from mission_control.modules.choice import SourceChoice
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.graph import Graph
+from mission_control.modules.long_updates import LongUpdates
 from mission_control.modules.orders import (
     ModuleOrder,
     UnitParameters,
@@ -52,7 +53,6 @@ if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
     from numpy.typing import NDArray
 
 _TABLES = ("overwritten", "modules")  # suffixes in the statistics, so that each entry has its own name
-LONG_UPDATE_S = 5.0  # chosen: longer than a slow planner computes; seconds of the machine
 REPORT_EVERY_S = 1.0  # chosen: a person reads no faster; seconds of the mission
 
 
@@ -94,8 +94,9 @@ class UnitComponent(Component[UnitParameters]):
         fresh, exchanged = self._fresh_views, self._exchanged
         self._exchanges = UnitExchanges(self, self._modules, self._graph, lambda: self._unit, fresh, exchanged)
         self._missed, self._report_again_s = 0, -math.inf
-        self._misses_text = self._long_text = ""
+        self._misses_text = ""
         self._deadlines = self._new_deadlines()
+        self._updates = LongUpdates(self, lambda: self._unit.computing, self._tell)
 
     def _new_unit(self) -> ExecutionUnit:
         trigger = Trigger(self.parameters.frequency_hz, self.parameters.on_input)
@@ -128,22 +129,13 @@ class UnitComponent(Component[UnitParameters]):
         self.start_task(self._deadlines.watch(), "deadlines")
         if self._thread is not None:
             if self._place is not None:
-                self.start_task(self._watch_long_updates(), "long updates")
+                self.start_task(self._updates.watch(), "long updates")
             await self._thread.keep()
         while self._unit.due_s < math.inf:
             await self.clock.sleep_until_s(self._unit.due_s)
             now_s = self.clock.now_s()
             if self._unit.tick(now_s):
                 self._run(now_s)
-
-    async def _watch_long_updates(self) -> None:
-        """Report the module whose ``update`` has run for ``LONG_UPDATE_S`` or longer, until it ends."""
-        while True:
-            before = self._unit.computing
-            await self.clock.sleep_s(LONG_UPDATE_S * self.clock.rate)
-            is_long = before is not None and before is self._unit.computing
-            self._long_text = f"{before.module} computes since {before.round_s:.3f} s" if before and is_long else ""
-            self._tell()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer questions for debug views and modules, and exchange a module."""
@@ -259,7 +251,7 @@ class UnitComponent(Component[UnitParameters]):
 
     def _tell(self) -> None:
         """Report late inputs, a long update, missed rounds, and the place of the thread."""
-        texts = self._deadlines.text, self._long_text, self._misses_text, self._thread_text()
+        texts = self._deadlines.text, self._updates.text, self._misses_text, self._thread_text()
         self.report("; ".join(filter(None, texts)))
 
     def _thread_text(self) -> str:

@@ -20,7 +20,7 @@ from sample_modules import Number
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
-from backbone.component.messages import AskStatistics, ComponentState, Statistics, StoryEvent
+from backbone.component.messages import AskStatistics, ComponentState, LogLevel, Statistics, StoryEvent
 from backbone.debug_views import ListViews, Views
 from backbone.exchange import SwapModule, Swapped
 from backbone.keys import Conversation
@@ -28,7 +28,7 @@ from backbone.module_waits import AskModule, ModuleWaits
 from backbone.naming import Subsystem
 from backbone.waiting import end_tasks
 from backbone.wire import OversizedMessage
-from mission_control.modules import unit_component, unit_exchanges, unit_thread
+from mission_control.modules import long_updates, unit_exchanges, unit_thread
 from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.graph import Graph, Member
@@ -161,21 +161,27 @@ async def test_a_long_round_delays_no_answer_and_only_the_newest_value_waits_for
 async def test_an_update_that_does_not_end_is_named_until_it_ends(
     local_mission: Any, beside: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(unit_component, "LONG_UPDATE_S", 0.05)
-    told: asyncio.Queue[str] = asyncio.Queue()
+    monkeypatch.setattr(long_updates, "LONG_UPDATE_S", 0.05)
+    told, logged = asyncio.Queue[str](), asyncio.Queue[StoryEvent]()
     async with units(local_mission, beside, ORDERS[:1], "same") as (bus, _heard), asyncio.timeout(WITHIN_S):
         bus.subscribe(
             "mission_control/one", Conversation.STATUS, ComponentState, lambda one: told.put_nowait(one.body.feedback)
         )
+        bus.subscribe("mission_control/one", Conversation.LOG, StoryEvent, lambda one: logged.put_nowait(one.body))
         OPEN.clear()
         bus.publish(TESTER, Conversation.EVENTS, Number(1.0))
         while not (text := await told.get()).startswith("passing computes since "):
             pass
         waits = await bus.ask("mission_control/one", AskModule("passing"), ModuleWaits, within_s=WITHIN_S)
         assert text == f"passing computes since {waits.computes_since_s:.3f} s"
+        event = await logged.get()
+        assert (event.subject, event.level) == ("passing", LogLevel.WARNING)
+        assert event.what == f"update does not end; it computes since {waits.computes_since_s:.3f} s"
+        await asyncio.sleep(0.2)  # for several looks at the same update
         OPEN.set()
         while (await told.get()) != "":
             pass
+        assert (await logged.get()).what == "update ends in time again; it was late 1 time", "named once"
 
 
 async def _statistics(bus: Bus) -> dict[str, float]:
