@@ -68,7 +68,6 @@ class OtherHosts:
         self.names = list(self._commands)
         """Names of all other machines, in the order of the mission file."""
         self._creators = {address(Subsystem.BACKBONE, creator_name(host)): host for host in self._commands}
-        self._offers = {address(Subsystem.BACKBONE, offer_name(host)) for host in self._commands}
         self._absent = {
             host: _Absent(now_s, "it was not offered to the mission yet", was_there=False) for host in self._commands
         }
@@ -90,7 +89,7 @@ class OtherHosts:
 
     @property
     def offering(self) -> list[str]:
-        """Addresses of the present offers, which keep the creators of these machines."""
+        """Addresses of the present offers, which keep the creators of other machines, declared or not."""
         return sorted(self._offering)
 
     def command(self, host: str) -> str:
@@ -99,7 +98,7 @@ class OtherHosts:
 
     def token_changed(self, changed: str, stands: bool, now_s: float) -> bool:
         """Record a change of a liveliness token; return whether it added or removed a machine."""
-        if changed in self._offers:
+        if changed.startswith(address(Subsystem.BACKBONE, offer_name(""))):
             (self._offering.add if stands else self._offering.discard)(changed)
         host = self._creators.get(changed)
         if host is None or stands is (host not in self._absent):

@@ -109,9 +109,10 @@ def test_a_missing_machine_degrades_the_mission() -> None:
 def test_the_commands_that_offer_machines_are_known_while_they_are_there() -> None:
     others = OtherHosts(mission(BASE, FAR), 0.0)
     assert not others.token_changed("backbone/offer-far", True, 1.0)
-    others.token_changed("backbone/offer-elsewhere", True, 1.0)
-    assert others.offering == ["backbone/offer-far"]
+    assert not others.token_changed("backbone/offer-field", True, 1.0), "the file does not have this machine"
+    assert others.offering == ["backbone/offer-far", "backbone/offer-field"]
     others.token_changed("backbone/offer-far", False, 2.0)
+    others.token_changed("backbone/offer-field", False, 2.0)
     assert others.offering == []
 
 
