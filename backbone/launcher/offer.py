@@ -3,12 +3,14 @@
 The offer outlives the link. If the link to the hub is down for ``CUT_OFF_S``, the offer ends its creator and all
 components of that creator. It then reconnects to the hub, reads the mission's clock again, and starts a new creator.
 It does the same if this machine's folder is removed.
-The offer ends when the mission's launcher asks it to (``down``), or on a signal.
+The offer ends when the mission's launcher asks it to (``down``), or on a signal. If another machine has its name, the
+launcher does not know this offer; it then watches the launcher and ends when the mission ends.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
 import socket
@@ -18,14 +20,14 @@ from enum import StrEnum
 from pathlib import Path
 from typing import ClassVar
 
-from backbone.addresses import NAMESERVER
+from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.authentication import read_secret_file
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, AskTime, LogLevel, MissionTime
+from backbone.component.messages import Absence, AskState, AskTime, ComponentState, LifeState, LogLevel, MissionTime
 from backbone.creator.messages import (
     ListProcesses,
     Processes,
@@ -33,14 +35,15 @@ from backbone.creator.messages import (
     offer_name,
 )
 from backbone.errors import HubUnreachable, LinkError, Refusal
+from backbone.keys import Conversation
 from backbone.launcher.kept_creator import KeptCreator, Offered, recorder_of_host
 from backbone.launcher.link_speed import LinkSpeed
-from backbone.launcher.mission_connection import REPLY_TIME_S, clock_elsewhere, mission_clock
+from backbone.launcher.mission_connection import REPLY_TIME_S, clock_elsewhere, connected, mission_clock
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.naming import Subsystem, legal
 from backbone.operating_system.ending_signals import orders_to_end
-from backbone.waiting import set_within
+from backbone.waiting import end_tasks, set_within
 from backbone.wire import Accepts, Envelope, Message
 
 OFFER_TYPE = "offer"
@@ -230,6 +233,7 @@ class Offering:
         self._offered, self._say, self._secret_file = offered, say, secret_file
         self._current: MachineOffer | None = None
         self._lives: asyncio.Task[None] | None = None
+        self._watching: asyncio.Task[None] | None = None
         self._is_ordered_to_end = self._was_in_the_mission = False
         self._said = ""
 
@@ -248,6 +252,9 @@ class Offering:
         except asyncio.CancelledError:
             if not self._is_ordered_to_end:
                 raise
+        finally:
+            if self._watching is not None:
+                await end_tasks(self._watching)
 
     def end(self) -> None:
         """End the creator and all its components; then ``run`` returns."""
@@ -268,6 +275,8 @@ class Offering:
                 if not self._was_in_the_mission:
                     raise
                 self._say_once(f"{refusal}; trying again, end with Ctrl-C")
+                if self._watching is None or self._watching.done():
+                    self._watching = asyncio.create_task(self._end_with_the_mission(), name="the mission's end")
             else:
                 if offer.ending is Ending.ORDERED:
                     return
@@ -307,7 +316,26 @@ class Offering:
             self._current = None
         return offer
 
+    async def _end_with_the_mission(self) -> None:
+        """End when the launcher ends the mission, because it does not know an offer without a name."""
+        offered, ends = self._offered, asyncio.Event()
+
+        def heard(launcher: ComponentState) -> None:
+            if launcher.state is LifeState.DRAINING:
+                ends.set()
+
+        source = f"{Subsystem.BACKBONE}/{offer_name(offered.host)}"
+        with contextlib.suppress(LinkError):  # the next refusal begins the watch again
+            async with connected(offered.mission, offered.endpoint, source, offered.secret) as (bus, _clock):
+                bus.subscribe(LAUNCHER, Conversation.STATUS, ComponentState, lambda told: heard(told.body))
+                heard(await bus.ask(LAUNCHER, AskState(), ComponentState, within_s=REPLY_TIME_S))
+                await ends.wait()
+                self._say_once(f"mission {offered.mission} ends")
+                self.end()
+
     def _is_in_the_mission(self) -> None:
+        if self._watching is not None:
+            self._watching.cancel()
         self._was_in_the_mission = True
         self._say_once(f"{self._offered.host} is in mission {self._offered.mission}")
 

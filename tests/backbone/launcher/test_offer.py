@@ -14,12 +14,13 @@ from typing import Any
 import msgspec
 import pytest
 
+from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock, LinkListener, Subscription
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.command_line.offering import offer_this_machine
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, AskState, ComponentState, Stop, Stopping
+from backbone.component.messages import Absence, AskState, ComponentState, LifeState, Stop, Stopping
 from backbone.component.name_claim import claim_name
 from backbone.creator.messages import (
     ListProcesses,
@@ -326,3 +327,59 @@ async def test_a_machine_whose_folder_cannot_be_made_keeps_no_bus_open(monkeypat
     with pytest.raises(RunFolderUnusable):
         await offering.run()
     assert [one.source for one in opened if not one.closed] == []
+
+
+@pytest.mark.parametrize("ends_meanwhile", [True, False], ids=["it ends later", "it is ending already"])
+async def test_an_offer_whose_name_is_taken_ends_with_the_mission(
+    local_mission: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, ends_meanwhile: bool
+) -> None:
+    """The launcher asks only the offer that has the name to end."""
+    clock, opened, said = MissionClock.started_now(), list[BusOnACable](), asyncio.Queue[str]()
+    launcher = ComponentState(LAUNCHER, "launcher", "base", 1, LifeState.READY, 1)
+
+    async def clock_there(*_where: object) -> MissionClock:
+        return clock
+
+    async with local_mission(clock=clock) as network:
+
+        class Opening:
+            @staticmethod
+            async def open_when_up(_mission: str, source: str, clock: Clock, _config: object) -> LocalBus:
+                opened.append(BusOnACable(network, source, clock))
+                return opened[-1]
+
+        @asynccontextmanager
+        async def connected(_mission: str, _endpoint: str, source: str, _secret: str) -> AsyncIterator[Any]:
+            bus = network.join(source, clock)
+            yield bus, clock
+            await bus.close()
+
+        async def answer(_asked: Envelope[Any]) -> ComponentState:
+            return launcher
+
+        fakes = {"clock_elsewhere": clock_there, "ZenohBus": Opening, "connected": connected}
+        for name, fake in {**fakes, "KeptCreator": lambda *_given: FakeCreator()}.items():
+            monkeypatch.setattr(offers, name, fake)
+        there = network.join(LAUNCHER, clock)
+        there.serve(LAUNCHER, AskState, answer)
+        offering = Offering(Offered("local", "unixsock-stream/nowhere", "far"), said.put_nowait)
+        life = asyncio.create_task(offering.run())
+        async with asyncio.timeout(WITHIN_S):
+            assert await said.get() == "far is in mission local"
+            own = await there.ask(f"backbone/{offer_name('far')}", AskState(), ComponentState, within_s=WITHIN_S)
+            for tokens in list(network.tokens.values()):
+                for token in [token for token in tokens if token.owner is opened[0]]:
+                    token.close()
+            await claim_name(there, clock, msgspec.structs.replace(own, start=own.start - 1))
+            ending = msgspec.structs.replace(launcher, state=LifeState.DRAINING)
+            launcher = launcher if ends_meanwhile else ending
+            opened[0].link_changed(False)
+            opened[0].link_changed(True)
+            assert (await said.get()).startswith(Ending.REPLACED)
+            assert "trying again" in await said.get()
+            while ends_meanwhile and not life.done():
+                there.publish(LAUNCHER, Conversation.STATUS, ending)
+                await asyncio.sleep(0.02)
+            await life
+            assert await said.get() == "mission local ends"
+        await there.close()
