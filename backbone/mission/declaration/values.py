@@ -29,6 +29,7 @@ MOST_DECIMAL = 1e12  # chosen: a thousand times the largest legal one; squares o
 
 _NAME = r"[a-z][a-z0-9_\-]{0,62}"
 _CLASS_PATH = r"[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*"
+_IN_A_CLASS_PATH = "of the letters A to Z and a to z, digits and '_'; no other letters."
 _BLANKS = " \t\r\n"  # those of XML; Python knows more
 _DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
@@ -101,14 +102,16 @@ ClassPath = Annotated[
     str,
     Field(
         pattern=rf"^{_CLASS_PATH}$",
-        json_schema_extra=_kind("class-path"),
+        json_schema_extra=_kind("class-path", f"Written package.module:Class, each name {_IN_A_CLASS_PATH}"),
     ),
 ]
 Driver = Annotated[
     str,
     Field(
         pattern=rf"^({_NAME}|{_CLASS_PATH})$",
-        json_schema_extra=_kind("driver"),
+        json_schema_extra=_kind(
+            "driver", f"A name, or a class written package.module:Class, each name {_IN_A_CLASS_PATH}"
+        ),
     ),
 ]
 Address = Annotated[

@@ -96,6 +96,15 @@ def test_bytes_that_are_no_utf_8_are_refused_where_they_stand(tmp_path: Path) ->
     assert (fault.line, fault.column) == (2, 6)
 
 
+def test_a_class_with_other_letters_is_refused_with_the_legal_ones(tmp_path: Path) -> None:
+    text = SMALL.read_text().replace(
+        "<types>", '<types><type name="own" subsystem="mission_control" class="weg.größe:Größe"/>'
+    )
+    fault, _no_module = faults_in(tmp_path, text)
+    assert fault.message.startswith("class='weg.größe:Größe' in <type> is illegal")
+    assert "each name of the letters A to Z and a to z, digits and '_'; no other letters" in fault.remedy
+
+
 @pytest.mark.parametrize("most", ["0", "99999999999"])
 def test_an_illegal_size_of_a_value_names_the_legal_ones(tmp_path: Path, most: str) -> None:
     quality = f'<modules><quality key="ball" most-bytes="{most}"/></modules>'
