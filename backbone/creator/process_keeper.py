@@ -238,8 +238,9 @@ class ProcessKeeper:
             for absence in self._supervision.absences(now_s)
         ]
         if self._zygote_trouble:
+            name = f"zygote of {component_of(self._bus.source)}" if self._bus is not None else "zygote"
             doing = "it is continued; new processes wait for it"
-            absent.append(Absence("zygote", self._zygote_trouble_since_s * rate, self._zygote_trouble, doing))
+            absent.append(Absence(name, self._zygote_trouble_since_s * rate, self._zygote_trouble, doing))
         return absent
 
     # Events

@@ -63,8 +63,8 @@ def recorder_of_host(offered: Offered, clock: Clock) -> MissionRecorder | None:
         return None
     directory = prepared_folder(offered)
     options = ["--connect", offered.endpoint, "--host-folder", str(directory), "--host-only"]
-    secret = ["--secret-file", str(directory / SECRET_NAME)] if offered.secret else []
-    return MissionRecorder(offered.mission, offered.record, clock, [*options, *secret])
+    options += ["--secret-file", str(directory / SECRET_NAME)] if offered.secret else []
+    return MissionRecorder(offered.mission, offered.record, clock, options, name=f"recorder of {offered.host}")
 
 
 class KeptCreator:

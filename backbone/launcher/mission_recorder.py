@@ -102,13 +102,17 @@ class MissionRecorder:
         path: File of the recording; the first unused name of its series is used.
         options: Further options of the command ``record``.
         facts: The facts of the mission, which the recorder reads from standard input.
+        name: Name of the recorder in the mission, for people.
 
     Attributes:
         on_changed: Called with one line for people when the recorder was lost, or records again.
     """
 
-    def __init__(self, mission: str, path: Path, clock: Clock, options: Sequence[str], facts: bytes = b"") -> None:
+    def __init__(
+        self, mission: str, path: Path, clock: Clock, options: Sequence[str], facts: bytes = b"", name: str = NAME
+    ) -> None:
         self.on_changed: Callable[[str], None] = lambda _line: None
+        self._name = name
         self._mission, self._path, self._clock = mission, path.absolute(), clock
         self._options, self._facts = options, facts
         self._process: Process | None = None
@@ -253,13 +257,13 @@ class MissionRecorder:
         return last or f"exit code {await self._process.wait()}"
 
     def _not_begun(self) -> Absence:
-        return Absence(NAME, self._clock.now_s(), "it does not listen yet", "components here wait for it")
+        return Absence(self._name, self._clock.now_s(), "it does not listen yet", "components here wait for it")
 
     def _is_late(self, process: Process) -> None:
         cause, doing = f"it has not begun within {BEGUN_WITHIN_S:g} s", "components here wait for it"
         remedy = f"Wait, if this machine is busy, or 'kill -9 {process.pid}'; then the mission does not come up."
         since_s = self._absence.since_s if self._absence is not None else self._clock.now_s()
-        self._absence = Absence(NAME, since_s, cause, doing, remedy)
+        self._absence = Absence(self._name, since_s, cause, doing, remedy)
         self.on_changed(f"waits for its recorder: {cause}")
 
     def _silent(self, is_silent: bool) -> None:
@@ -269,7 +273,7 @@ class MissionRecorder:
             pid = self._process.pid
             remedy = f"Wake it by 'kill -CONT {pid}', or 'kill -9 {pid}': then the recording goes on in a further file."
             doing = "its recording stands still, and messages wait for it as far as there is room"
-            self._absence = Absence(NAME, self._clock.now_s(), "it does not respond", doing, remedy)
+            self._absence = Absence(self._name, self._clock.now_s(), "it does not respond", doing, remedy)
             self.on_changed(f"its recorder does not respond: {doing}")
         else:
             self._absence = None
@@ -277,7 +281,7 @@ class MissionRecorder:
 
     def _lost(self, cause: str, doing: str, remedy: str = "") -> None:
         is_known = self._absence is not None and self._absence.cause == cause
-        self._absence = Absence(NAME, self._clock.now_s(), cause, doing, remedy)
+        self._absence = Absence(self._name, self._clock.now_s(), cause, doing, remedy)
         if not is_known:
             self.on_changed(f"lost its recorder: {cause}{f'; {doing}' if doing else ''}")
 

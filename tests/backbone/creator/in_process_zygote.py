@@ -31,6 +31,7 @@ class InProcessZygote:
         forked: Names in the order in which they were forked.
         wrote_stacks: Pids in the order in which they were ordered to write their stacks.
         refuses: Why there is no further process; empty: there is one.
+        trouble: What is said of it when it is looked at.
         was_busy_s: For how long it was busy.
     """
 
@@ -40,7 +41,7 @@ class InProcessZygote:
         self.lives: dict[int, Component[Any] | SharedProcess] = {}
         self.forked: list[str] = []
         self.wrote_stacks: list[int] = []
-        self.refuses = ""
+        self.refuses = self.trouble = ""
         self.was_busy_s = 0.0
         self._network, self._next_pid = network, 1000
         self._tasks: dict[int, asyncio.Task[None]] = {}
@@ -73,7 +74,7 @@ class InProcessZygote:
             self.lives[pid].end(number.name)
 
     def keep_running(self) -> str:
-        return ""
+        return self.trouble
 
     def busy_s(self) -> float:
         return self.was_busy_s

@@ -103,6 +103,19 @@ def test_start_returns_the_pid_when_the_component_is_ready(on_bench: Callable) -
     on_bench(body)
 
 
+def test_a_zygote_that_is_absent_has_its_owner_in_its_name(on_bench: Callable) -> None:
+    """Each host has one, so health would show only one of two with the same name."""
+
+    async def body(bench: Bench) -> None:
+        await bench.start("Quiet", "scout1")
+        bench.zygote.trouble = "it was stopped"
+        await VirtualClock().sleep_s(2.0)
+        [absent] = bench.keeper.absences()
+        assert (absent.name, absent.cause) == ("zygote of tester", "it was stopped")
+
+    on_bench(body)
+
+
 def test_a_killed_component_is_restarted_after_its_back_off_and_slowly_from_the_limit_on(on_bench: Callable) -> None:
     async def body(bench: Bench) -> None:
         await bench.start("Quiet", "scout1")

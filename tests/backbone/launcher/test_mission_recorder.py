@@ -17,7 +17,8 @@ import pytest
 
 from backbone.bus.clock import MissionClock
 from backbone.launcher import mission_recorder
-from backbone.launcher.mission_recorder import MissionRecorder, RecorderFailed
+from backbone.launcher.kept_creator import Offered, recorder_of_host
+from backbone.launcher.mission_recorder import MissionRecorder, RecorderFailed, absences_of
 from backbone.recording.recorder import LEAST_FREE_BYTES
 from backbone.waiting import end_tasks
 
@@ -217,3 +218,13 @@ async def test_one_whose_file_cannot_grow_though_there_is_room_is_absent_for_goo
     absence = recorder.absence()
     assert absence is not None
     assert "another file" in absence.remedy
+
+
+def test_the_recorder_of_another_host_has_the_host_in_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise health shows only one of two recorders that are absent."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    recorder = recorder_of_host(
+        Offered("night", "unixsock-stream/nowhere", "far", record=tmp_path / "far.mcap"), MissionClock.started_now()
+    )
+    [absent] = absences_of(recorder)
+    assert absent.name == "recorder of far"
