@@ -20,14 +20,16 @@ from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope
 
 MOMENT_S = 0.01  # chosen: a rest shorter than the clock's rounding would never pass; machine seconds
+SMALL_MISSION = 100  # chosen: as many components are listed in 50 kB, twice a second
 REST_S = 5.0  # chosen: heartbeats, tokens and states show every fault but one: a service that beats without answering
 
 
 class HealthWatch:
     """Examines the mission and publishes its health under the launcher's address.
 
-    While something is absent, it examines every ``LOOK_EVERY_S``. In a healthy mission it waits for news. It also
-    examines every ``REST_S``, to find a service that beats and does not answer.
+    While something is absent, it examines every ``LOOK_EVERY_S``; a mission with more than ``SMALL_MISSION`` components
+    less often, in proportion, and at news. In a healthy mission it waits for news. It also examines every ``REST_S``,
+    to find a service that beats and does not answer.
 
     Args:
         changed: Called when ``absences`` changes.
@@ -70,7 +72,10 @@ class HealthWatch:
                     news = self._news
                     self._say()
                     due_s = self._due_in_s()
-                    await self._pause(news, min(LOOK_EVERY_S / 2, due_s), due_s)
+                    if self._is_sound:
+                        await set_within(news, due_s)
+                    else:
+                        await self._clock.sleep_s(min(LOOK_EVERY_S / 2, due_s) * self._clock.rate)
         finally:
             for subscription in hearing:
                 subscription.close()
@@ -87,14 +92,12 @@ class HealthWatch:
             if self.absences() != missed:
                 self._changed()
             await self._clock.sleep_s(LOOK_EVERY_S * rate)
-            await self._pause(news, 0.0, REST_S)
+            more_s = LOOK_EVERY_S * (len(self._components) / SMALL_MISSION - 1.0)
+            await set_within(news, REST_S if self._is_sound else min(REST_S, max(0.0, more_s)))
 
-    async def _pause(self, news: asyncio.Event, troubled_s: float, healthy_s: float) -> None:
-        """Wait ``troubled_s``; if the mission is healthy, wait ``healthy_s`` or until the news. Machine seconds."""
-        if self.picture.problems or self._health().word is not HealthWord.OK:
-            await self._clock.sleep_s(troubled_s * self._clock.rate)
-        else:
-            await set_within(news, healthy_s)
+    @property
+    def _is_sound(self) -> bool:
+        return not self.picture.problems and self._health().word is HealthWord.OK
 
     def _heard_state(self, envelope: Envelope[ComponentState]) -> None:
         state = envelope.body

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from itertools import pairwise
 
+import pytest
 from msgspec.structs import replace
 
 from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
@@ -35,6 +36,7 @@ class Services:
         self.asked = Counter[str]()
         self.hung: set[str] = set()
         self.state = ComponentState(CREATOR, "creator", "base", 7, LifeState.READY, 0.0)
+        self.others: list[ComponentState] = []
         self.voices = {at: network.join(at, self.clock) for at in (NAMESERVER, RC_MANAGER, PLACER, LAUNCHER, CREATOR)}
         for at, voice in self.voices.items():
             voice.serve(at, ListComponents | AskTime | ListProcesses, self.answer)
@@ -53,7 +55,7 @@ class Services:
             await asyncio.Event().wait()
         match asked.body:
             case ListComponents():
-                return Components([self.state], True, 0.0)
+                return Components([self.state, *self.others], True, 0.0)
             case AskTime():
                 return MissionTime(self.clock.now_s(), 1.0, 0.0)
             case _:
@@ -134,6 +136,25 @@ def test_an_absence_that_an_owner_reports_is_said_at_once_and_so_is_its_end() ->
                 assert await services.until_said(HealthWord.DEGRADED) < 2 * LOOK_EVERY_S
                 services.miss()
                 assert await services.until_said(HealthWord.OK) < 2 * LOOK_EVERY_S
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(("components", "rounds"), [(90, 40), (400, 10), (10_000, 4)])
+def test_while_something_is_absent_a_large_mission_is_asked_less_often_and_news_is_said_at_once(
+    components: int, rounds: int
+) -> None:
+    async def main() -> None:
+        async with watched() as services:
+            ready = ComponentState("mission_control/one", "wait", "base", 7, LifeState.READY, 0.0)
+            services.others = [replace(ready, address=f"mission_control/one{number}") for number in range(components)]
+            services.miss(LOST)
+            assert await services.until_said(HealthWord.DEGRADED) < 2 * LOOK_EVERY_S
+            services.asked.clear()
+            await services.clock.sleep_s(20.0)
+            assert services.asked["ListComponents"] == pytest.approx(rounds, abs=2)
+            services.miss()
+            assert await services.until_said(HealthWord.OK) < 2 * LOOK_EVERY_S
 
     run_virtual(main())
 
