@@ -31,6 +31,7 @@ from backbone.spoken import value_text
 from backbone.wire import Envelope, Message, plain
 from mission_control.acting import cancel
 from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.behaviors.message_fields import never_equal, never_within, values_at, words_of
 from mission_control.child_keeper import why
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, MotionSeen, WaypointReached
 from resource_pool.arc_client import Readings, StopState, ask_readings, watch_readings
@@ -139,9 +140,22 @@ class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
             raise ValueError("field is empty: name the field that is compared")
         if self.above is not None and self.below is not None and self.above >= self.below:
             raise ValueError(f"above is {self.above:g} and below is {self.below:g}: no number is between them")
+        if self.field and kind is not Readings:  # the values of readings are known to the RC; ``check`` compares them
+            self._check_field(kind)
         if kind in ASKED_FOR and (self.source == ANY or _asked_at(kind, self.source) is None):
             asked = "behavior whose report is" if kind is BehaviorState else "RC whose readings are"
             raise ValueError(f"source is {self.source}: name the {asked} asked for")
+
+    def _check_field(self, kind: type[Message]) -> None:
+        types, of = values_at(kind, self.field), f"{self.field} of {kind.__name__}"
+        if self.equals is not None and never_equal(types, self.equals):
+            words = words_of(types)
+            there = f"; write one of {', '.join(words)}" if words else ""
+            raise ValueError(f"equals is {value_text(self.equals)}, and {of} is never that{there}")
+        limits = {"above": self.above, "below": self.below}
+        for name, limit in limits.items():
+            if limit is not None and never_within(types, **{**dict.fromkeys(limits), name: limit}):
+                raise ValueError(f"{name} is {limit:g}, and {of} is never {name} it")
 
 
 class MessageCondition(Behavior[MessageConditionParameters]):

@@ -10,6 +10,7 @@ from trees_of_components import FAILURE, SUCCESS, Battery, is_running, node, roo
 
 from backbone.component.messages import WrongParameter
 from backbone.keys import Conversation
+from backbone.wire import Message
 from mission_control.behaviors.condition import Comparison, MessageConditionParameters
 from mission_control.messages import BehaviorStatus, MotionSeen, Region, WaypointReached
 
@@ -127,8 +128,47 @@ def test_a_comparison_reads_one_field(comparison: Comparison, holds: bool) -> No
         ({"message": "MotionSeen", "source": "Watch 1"}, "component's name or address"),
         ({"message": "BehaviorState"}, "name the behavior"),
         ({"message": "MotionSeen", "field": "at_s", "above": 3.0, "below": 3.0}, "no number is between them"),
+        ({"message": "MotionSeen", "field": "width_px"}, "MotionSeen has no 'width_px'"),
+        (
+            {"message": "MotionSeen", "field": "region.widht_px"},
+            "did you mean 'width_px'",
+        ),
+        ({"message": "MotionSeen", "field": "robot.name"}, "robot of MotionSeen has no parts"),
+        ({"message": "MotionSeen", "field": "robot", "above": 1.0}, "robot of MotionSeen is never above it"),
+        ({"message": "MotionSeen", "field": "region.width_px", "below": 0.0}, "is never below it"),
+        ({"message": "MotionSeen", "field": "region.width_px", "equals": "wide"}, 'equals is "wide"'),
+        ({"message": "MotionSeen", "field": "region.width_px", "equals": True}, "equals is true"),
+        (
+            {"message": "BehaviorState", "source": "a", "field": "status", "equals": "done"},
+            "one of running, success",
+        ),
     ],
 )
 def test_a_condition_that_cannot_be_is_refused(parameters: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         MessageConditionParameters(**parameters)
+
+
+class Odd(Message, frozen=True):
+    """An event with fields of which little is known."""
+
+    any: Any
+    either: int | str | None
+    deep: dict[str, dict[str, float]]
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"message": "BehaviorState", "source": "a", "field": "status", "equals": "success"},
+        {"message": "BehaviorState", "source": "a", "field": "payload.anything.below", "above": 1.0},
+        {"message": "Readings", "source": "scout1", "field": "values.anything", "equals": "x"},
+        {"message": f"{__name__}:Odd", "field": "any.thing", "equals": True},
+        {"message": f"{__name__}:Odd", "field": "either", "equals": "x"},
+        {"message": f"{__name__}:Odd", "field": "either", "below": -5.0},
+        {"message": f"{__name__}:Odd", "field": "deep.a.b", "above": 0.0, "below": 1.0},
+        {"message": f"{__name__}:Battery", "field": "charge", "equals": 1},
+    ],
+)
+def test_a_condition_that_may_become_true_is_not_refused(parameters: dict[str, Any]) -> None:
+    MessageConditionParameters(**parameters)
