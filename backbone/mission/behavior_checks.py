@@ -35,20 +35,21 @@ def check_behaviors(tables: Tables, report: Report) -> None:
     ]
     for behavior in tables.behaviors:
         kind, name = behavior.text("type"), behavior.text("name")
-        if kind in tables.types and kind not in behavior_types:
-            report.fault(
-                behavior.place_of("type"),
-                f"type {kind} is no behavior",
-                f"Behaviors are types of subsystem mission_control: {listed(behavior_types) or 'there is none'}",
-            )
-        elif is_known(behavior, "type", "type of behavior", behavior_types, report):
-            check_multiplicity(behavior, "type", kind, tables, of_one, report)
         if name and name == tables.root.text("name"):
             report.fault(
                 behavior.place_of("name"),
                 f"behavior {name} has the name of the mission, which is its tree's root",
                 "Choose another name",
             )
+        if kind in tables.types and kind not in behavior_types:
+            report.fault(
+                behavior.place_of("type"),
+                f"type {kind} is no behavior",
+                f"Behaviors are types of subsystem mission_control: {listed(behavior_types) or 'there is none'}",
+            )
+            continue
+        if is_known(behavior, "type", "type of behavior", behavior_types, report):
+            check_multiplicity(behavior, "type", kind, tables, of_one, report)
         check_parameters(behavior, TREE_PARAMETERS, report)
         check_class_parameters(behavior, TREE_PARAMETERS, tables, report)
         _check_inside(behavior, tables, report)
@@ -79,7 +80,7 @@ def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
     if fewest <= len(given) <= most:
         _check_counts(behavior, facts, report)
         return
-    wanted = "none" if most == 0 else "exactly one" if fewest == most == 1 else f"at least {fewest}"
+    wanted = "none" if most == 0 else "exactly one" if fewest == most == 1 else f"{fewest} to {most}"
     report.fault(
         given[most].place if len(given) > most else behavior.place,
         f"{behavior.text('type')} {behavior.text('name')} has {counted(len(given), 'behavior')} inside",

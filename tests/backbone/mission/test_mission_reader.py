@@ -33,6 +33,12 @@ from backbone.naming import MAX_NAME_LENGTH
 EXAMPLES = MISSION_XML.parent / "docs" / "examples"
 
 
+SMALL_TREE = (
+    '<mission name="tree" priority="1"><hosts><host name="base" address="127.0.0.1"/></hosts>'
+    "<behaviors>{}</behaviors></mission>"
+)
+
+
 @pytest.mark.parametrize("path", BROKEN, ids=lambda path: path.stem)
 def test_every_fault_of_a_broken_file_is_told_with_its_place(path: Path) -> None:
     assert [f"{fault.line}:{fault.column}: {fault.message}" for fault in faults_of_broken(path)] == announced(path)
@@ -94,6 +100,21 @@ def test_too_many_and_too_deep_elements_are_refused_where_they_begin(tmp_path: P
 def test_bytes_that_are_no_utf_8_are_refused_where_they_stand(tmp_path: Path) -> None:
     [fault] = faults_in(tmp_path, b"<!-- one -->\n<!-- \xff -->\n<mission/>")
     assert (fault.line, fault.column) == (2, 6)
+
+
+def test_too_many_children_are_refused_with_both_limits(tmp_path: Path) -> None:
+    wait = '<behavior type="wait" name="w{}" priority="1"><parameter name="seconds" value="1"/></behavior>'
+    inside = "".join(map(wait.format, range(257)))
+    text = SMALL_TREE.format(f'<behavior type="sequence" name="all" priority="1">{inside}</behavior>')
+    [fault] = faults_in(tmp_path, text)
+    assert (fault.message, fault.remedy) == ("sequence all has 257 behaviors inside", "Give it 1 to 256")
+
+
+@pytest.mark.parametrize("kind", ["drive", "scout", "placer"])
+def test_a_type_that_is_no_behavior_is_one_fault(tmp_path: Path, kind: str) -> None:
+    text = SMALL_TREE.format(f'<behavior type="{kind}" name="own" priority="1"/>')
+    [fault] = faults_in(tmp_path, text)
+    assert fault.message == f"type {kind} is no behavior"
 
 
 def test_a_class_with_other_letters_is_refused_with_the_legal_ones(tmp_path: Path) -> None:
