@@ -13,7 +13,7 @@ from backbone.mission.class_facts import shipped_classes
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
 from backbone.mission.tables import CORE_SERVICES, Tables, parameter_value
-from backbone.naming import Subsystem, is_legal
+from backbone.naming import Subsystem, is_component, is_legal
 
 CONDITION = "mission_control.behaviors.condition:MessageCondition"
 """Class of the behaviors that check conditions on messages."""
@@ -70,7 +70,7 @@ def check_named(behavior: Element, tables: Tables, report: Report) -> None:
         value, what = _text(given, one.name), one.schema.get("names", "")
         is_judged = value and what and one.accepts(parameter_value(value))
         known = _nameable(what, value, _text(given, "localizer"), tables) if is_judged else None
-        name = value.rpartition("/")[2]
+        name = value.rpartition("/")[2] if is_component(value) else value
         if known is not None and name not in known and _text(given, "message") != READINGS:
             report.fault(
                 given[one.name].place_of("value"),
@@ -91,6 +91,8 @@ def _nameable(what: str, value: str, localizer: str, tables: Tables) -> list[str
     if what == "localizer":
         kinds = {name: tables.facts_of(one.text("type")) for name, one in tables.resources.items()}
         pool = [*(name for name, facts in kinds.items() if facts is None or facts.locates), *world]
+        if subsystem and not is_component(value):
+            return pool
     if what == "unit":
         return units
     if what == "body":
@@ -116,12 +118,12 @@ def _check_limits(given: Mapping[str, Element], rc: str, form: FieldForm, report
         place = given[limit].place_of("value")
         if form.kind not in (ValueKind.NUMBER, ValueKind.WHOLE):
             report.fault(place, f"{form.name} of {rc} is no number", 'Write equals="true" or equals="false"')
-        elif not form.least <= value <= form.most:
-            how_often = "never" if (limit == "above") is (value > form.most) else "always"
+        elif not (form.least <= value < form.most if limit == "above" else form.least < value <= form.most):
+            how_often = "never" if (limit == "above") is (value >= form.most) else "always"
             report.fault(
                 place,
                 f"{form.name} of {rc} is {how_often} {limit} {value:g}",
-                f"Write a number from {form.least:g} to {form.most:g}",
+                f"Write a number between {form.least:g} and {form.most:g}",
             )
 
 

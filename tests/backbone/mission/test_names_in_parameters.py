@@ -37,6 +37,8 @@ def follow(target: str, localizer: str = "world") -> str:
         (go_to("resource_pool/watch-scout1-capture"), "no localizer is named 'resource_pool/watch-scout1-capture'"),
         (go_to("localiser"), "no localizer is named 'localiser' (did you mean 'localizer'?)"),
         (go_to("watch-scout1"), "no localizer is named 'watch-scout1'"),
+        (go_to("elsewhere/localizer"), "no localizer is named 'elsewhere/localizer' (did you mean 'localizer'?)"),
+        (go_to("../.."), "no localizer is named '../..'"),
         (
             go_to("resource_pool/localiser"),
             "no localizer is named 'resource_pool/localiser' (did you mean 'localizer'?)",

@@ -226,6 +226,9 @@ def test_readings_have_one_source_in_the_resource_pool(source: str) -> None:
         ),
         ('name="below" value="0.3"', 'name="below" value="30"', "battery_share of scout1 is always below 30"),
         ('name="below" value="0.3"', 'name="above" value="30"', "battery_share of scout1 is never above 30"),
+        ('name="below" value="0.3"', 'name="above" value="1"', "battery_share of scout1 is never above 1"),
+        ('name="below" value="0.3"', 'name="below" value="0"', "battery_share of scout1 is never below 0"),
+        ('name="below" value="0.3"', 'name="above" value="-1"', "battery_share of scout1 is always above -1"),
     ],
 )
 def test_a_condition_on_what_no_rc_reports_is_a_fault_with_its_line(
