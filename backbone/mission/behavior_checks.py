@@ -50,6 +50,14 @@ def check_behaviors(tables: Tables, report: Report) -> None:
             continue
         if is_known(behavior, "type", "type of behavior", behavior_types, report):
             check_multiplicity(behavior, "type", kind, tables, of_one, report)
+        facts = tables.facts_of(kind)
+        if facts is not None and not set(TREE_PARAMETERS) <= set(facts.given):
+            report.fault(
+                behavior.place_of("type"),
+                f"type {kind} is no behavior: its class {tables.types[kind].text('class')} is none",
+                "Derive the class from mission_control.behavior:Behavior",
+            )
+            continue
         check_parameters(behavior, TREE_PARAMETERS, report)
         check_class_parameters(behavior, TREE_PARAMETERS, tables, report)
         _check_inside(behavior, tables, report)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 import subprocess
 from pathlib import Path
@@ -139,13 +140,26 @@ async def test_a_robot_that_is_stopped_holds_the_end_up_for_the_branchs_time_onl
         assert mission.launcher.wait(30) == 0, mission.story()
 
 
+NEVER_MADE = """
+from mission_control.behavior import Behavior
+
+
+class NeverMade(Behavior):
+    def __init__(self, launch, bus, clock):
+        super().__init__(launch, bus, clock)
+        raise RuntimeError("never")
+"""
+
+
 @pytest.mark.thorough
-def test_a_branch_that_cannot_start_holds_nothing_up(tmp_path: Path) -> None:
-    text, plain = HOME_AT_THE_END.read_text(), "backbone.component.component:Component"
-    kind = f'<types><type name="no-behavior" class="{plain}" subsystem="mission_control"/></types><resources>'
+def test_a_branch_that_cannot_start_holds_nothing_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "never_made.py").write_text(NEVER_MADE)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
+    text, own = HOME_AT_THE_END.read_text(), "never_made:NeverMade"
+    kind = f'<types><type name="never-made" class="{own}" subsystem="mission_control"/></types><resources>'
     head, tail = text.partition("<last")[0].replace("<resources>", kind), text.partition("</last>")[2]
     file = tmp_path / "mission.xml"
-    file.write_text(f'{head}<last><behavior type="no-behavior" name="end-of-day" priority="1"/></last>{tail}')
+    file.write_text(f'{head}<last><behavior type="never-made" name="end-of-day" priority="1"/></last>{tail}')
     with mission_up(mission_xml=file) as mission:
         patrols(mission)
         down = mission.command("scout-backbone", "down", within_s=30.0)

@@ -117,6 +117,13 @@ def test_a_type_that_is_no_behavior_is_one_fault(tmp_path: Path, kind: str) -> N
     assert fault.message == f"type {kind} is no behavior"
 
 
+def test_a_behavior_whose_class_is_none_is_refused(tmp_path: Path) -> None:
+    own = '<type name="own" subsystem="mission_control" class="backbone.component.component:Component"/>'
+    text = SMALL_TREE.format('<behavior type="own" name="first" priority="1"/>')
+    [fault] = faults_in(tmp_path, text.replace("<behaviors>", f"<types>{own}</types><behaviors>"))
+    assert fault.message == "type own is no behavior: its class backbone.component.component:Component is none"
+
+
 def test_a_class_with_other_letters_is_refused_with_the_legal_ones(tmp_path: Path) -> None:
     text = SMALL.read_text().replace(
         "<types>", '<types><type name="own" subsystem="mission_control" class="weg.größe:Größe"/>'

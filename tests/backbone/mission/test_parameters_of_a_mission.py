@@ -14,6 +14,7 @@ import pytest
 
 from backbone.component.abilities import UNLIMITED
 from backbone.mission import class_asking
+from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of, shipped_classes
 from backbone.mission.reader import Fault, MissionInvalid, read_mission, read_mission_bytes
@@ -27,9 +28,9 @@ PROTOCOL = "resource_pool.drivers.simulated:SimulatedScoutProtocol"
 OWN_TYPE = '    <type name="own" class="{path}" subsystem="mission_control"/>\n  </types>'
 GOOD = """
 import msgspec
-from backbone.component.component import Component
+from mission_control.behavior import Behavior, BehaviorParameters
 
-class Parameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Parameters(BehaviorParameters, frozen=True, kw_only=True):
     '''Own.
 
     Attributes:
@@ -38,7 +39,7 @@ class Parameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     depth_m: float = 1.0
 
-class Own(Component):
+class Own(Behavior):
     parameters_type = Parameters
 """
 
@@ -90,7 +91,7 @@ def test_a_class_of_ones_own_is_asked_for_its_parameters(modules: Path) -> None:
         ("print('Own')\nimport os\nos._exit(3)", "the process that imports its module ends without an answer"),
         ("import sys\nsys.exit('Own')", "its module cannot be imported: SystemExit: Own ({file}, line 2)"),
         (GOOD.replace("float = 1.0", "type | set[complex] = int"), "cannot be listed: parameter depth_m: TypeError"),
-        (GOOD.replace("Own(Component):", "Own(Component):\n    driver_options = 5"), "cannot be listed: TypeError"),
+        (GOOD.replace("Own(Behavior):", "Own(Behavior):\n    driver_options = 5"), "cannot be listed: TypeError"),
     ],
     ids=["import", "error", "library", "syntax", "exit", "sys.exit", "no schema", "hook"],
 )
@@ -238,7 +239,8 @@ def test_bytes_are_read_without_running_a_module_if_the_caller_says_which_classe
     assert [fault.message for fault in caught.value.faults if "no class" not in fault.message] == [
         "watch has no parameter 'veiw_s' (did you mean 'view_s'?)"
     ]
-    known = {"own_unasked:Own": ClassFacts(parameters=(ParameterFacts("some", {"type": "integer"}),))}
+    some = ParameterFacts("some", {"type": "integer"})
+    known = {"own_unasked:Own": ClassFacts(parameters=(some,), given=TREE_PARAMETERS)}
     with pytest.raises(MissionInvalid, match="own mine lacks parameter some"):
         read_mission_bytes(text.encode(), "m.xml", known)
     assert not (modules / "ran").exists()

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from shipped_drafts import EVERYTHING_DECLARED, ROOT, SHIPPED
 
 from backbone.errors import Refusal
+from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import Element, NewElement, outline
 from backbone.mission.reader import MissionInvalid, read_mission
@@ -366,6 +367,6 @@ def test_parameters_of_shipped_classes_are_judged_and_of_others_once_they_were_l
     draft = draft.do(add_behavior((), "own", "mine")).do(write_parameter((4, 1), "depth_m", "deep"))
     assert draft.problems == ()
     depth = ParameterFacts("depth_m", {"type": "number", "default": 1.0})
-    known = draft.knowing({"backbone.naming:Subsystem": ClassFacts(parameters=(depth,))})
+    known = draft.knowing({"backbone.naming:Subsystem": ClassFacts(parameters=(depth,), given=TREE_PARAMETERS)})
     assert [fault.message for fault in known.problems] == ["depth_m='deep' is illegal"]
     assert known.undo().redo().problems == known.problems
