@@ -30,6 +30,18 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
 HOLD_S = 1.0  # as holding.js has it
 
+HELD_FOR = """async (button, [by, forMs]) => {
+  const fire = (kind) => button.dispatchEvent(
+    by === "mouse"
+      ? new PointerEvent(`pointer${kind}`, { bubbles: true, isPrimary: true })
+      : new KeyboardEvent(`key${kind}`, { bubbles: true, key: "Enter", code: "Enter" }),
+  );
+  fire("down");
+  await new Promise((resolve) => setTimeout(resolve, forMs));
+  fire("up");
+}"""
+"""Held by the page's own timers, which also on a busy machine end in their order: no machine holds it longer."""
+
 
 @pytest.mark.parametrize(
     ("size", "robot", "gap_s"),
@@ -84,10 +96,8 @@ async def test_a_stop_is_lifted_by_holding_for_a_second_and_by_nothing_shorter(s
         lift = card(page).locator(".lift")
         await lift.focus()
         await lift.hover()
-        for held_s in (0.05, 0.4, 0.8 * HOLD_S):
-            await press()
-            await asyncio.sleep(held_s)
-            await let_go()
+        for held_s in (0.05, 0.4, 0.95 * HOLD_S):
+            await lift.evaluate(HELD_FOR, [by, 1000 * held_s])
         await lift.dblclick()
         await page.keyboard.press("Space")
         await asyncio.sleep(HOLD_S)
