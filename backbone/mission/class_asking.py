@@ -10,6 +10,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 
 import msgspec
@@ -90,7 +91,8 @@ def _facts(line: bytes) -> ClassFacts:
 
 def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
     """Return the lines that the other process printed, one for each question, and why there are not more."""
-    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what, f"{WITHIN_S * STACKS_AFTER}"]
+    stacks_at_s = time.monotonic() + WITHIN_S * STACKS_AFTER  # of the machine: the start of the process counts
+    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what, f"{stacks_at_s}"]
     questions = "\0".join(about).encode()  # no arguments, whose length is limited
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     reason = "the process that imports its module ends without an answer"

@@ -7,6 +7,7 @@ import importlib
 import inspect
 import os
 import sys
+import time
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -25,6 +26,7 @@ from backbone.wire import Message, kinds_of, schema_of
 
 BY_CLASS_ALONE = ("multipleOf", "format", "contentEncoding")  # rules of a schema that ``ParameterFacts`` lacks
 ASK_POSE = "AskPose"  # the question to localizers, which the resource pool declares
+SOON_S = 0.001  # chosen: the shortest; a process that started so late has no time for an import
 ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; a hang or kill of their process ends no more
 
 
@@ -176,6 +178,7 @@ def _answer(what: str, about: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    faulthandler.dump_traceback_later(float(sys.argv[2]))  # the asking process prints the line at which the class hangs
+    left_s = max(SOON_S, float(sys.argv[2]) - time.monotonic())
+    faulthandler.dump_traceback_later(left_s)  # the asking process prints the line at which the class hangs
     _answer(sys.argv[1], sys.stdin.buffer.read().decode().split("\0"))
     os._exit(0)  # a thread that a module started at its import may never end
