@@ -9,12 +9,16 @@ import subprocess
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from running_mission import BIN, RunningMission
 
 from backbone.bus.interface import Bus
 from resource_pool.localization import AskPose, Pose
+
+HELD_WITHIN_S = 30.0
+Hand = Callable[[], Awaitable[None]]
 
 
 @dataclass
@@ -63,6 +67,25 @@ def serving(mission: RunningMission, port: int = 0) -> Iterator[Served]:
 async def truth(bus: Bus, robot: str) -> Pose:
     """Return where the robot stands, as the simulated world has it."""
     return await bus.ask("resource_pool/world", AskPose(robot), Pose, within_s=5.0)
+
+
+async def hold_until(page: Any, press: Hand, let_go: Hand, is_so: Callable[[], Awaitable[bool]], what: str) -> None:
+    """Press a control and hold it until this is so, and further.
+
+    A page that heard nothing for most of a second lets go of what is held, and asks to press anew. On a busy machine
+    that happens, and a person then presses anew.
+    """
+    await press()
+
+    async def is_so_by_now() -> bool:
+        if await is_so():
+            return True
+        if await page.locator("#let-go").is_visible():
+            await let_go()
+            await press()
+        return False
+
+    await wait_until(is_so_by_now, what, HELD_WITHIN_S)
 
 
 async def wait_until(is_so: Callable[[], Awaitable[bool]], what: str, within_s: float) -> None:

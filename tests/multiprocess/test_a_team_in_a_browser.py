@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Awaitable, Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 import web_browser
 from running_mission import mission_up
-from served_page import Served, serving, truth, wait_until
+from served_page import Served, hold_until, serving, truth, wait_until
 
 from backbone.keys import Conversation
 from resource_pool.localization import Pose
@@ -63,9 +64,9 @@ async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Ser
                 now = await truth(bus, robot)
                 return math.dist((now.x_m, now.y_m), (before.x_m, before.y_m)) > AHEAD_M
 
-            await page.keyboard.down("ArrowUp")
-            await wait_until(is_ahead, f"{robot} moves while the key is down", WITHIN_S)
-            await page.keyboard.up("ArrowUp")
+            down, up = partial(page.keyboard.down, "ArrowUp"), partial(page.keyboard.up, "ArrowUp")
+            await hold_until(page, down, up, is_ahead, f"{robot} moves while the key is down")
+            await up()
 
         await page.get_by_role("combobox", name="Taken with").select_option("lit_drive")
         await page.get_by_role("button", name="Take anew").click()

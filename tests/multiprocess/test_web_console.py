@@ -8,8 +8,9 @@ import math
 import os
 import re
 import stat
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 import pytest
@@ -17,7 +18,7 @@ import web_browser
 from free_ports import free_port
 from program_console import program, wait_until
 from running_mission import MISSION_XML, mission_up
-from served_page import Served, serving
+from served_page import Served, hold_until, serving
 from web_browser import Cable, Finger, assert_no_sideways_scroll
 
 from backbone.addresses import RC_MANAGER
@@ -57,6 +58,21 @@ def differs(one: Pose, other: Pose) -> bool:
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) > 0.005 or turned_rad > 0.03
 
 
+def moved(bus: Bus, before: Pose) -> Callable[[], Awaitable[bool]]:
+    """Return a question: has the robot moved since?"""
+
+    async def has_moved() -> bool:
+        return differs(before, await pose(bus))
+
+    return has_moved
+
+
+async def hold_key(page: Any, bus: Bus, before: Pose) -> None:
+    """Hold the key D until the robot has moved, and further."""
+    down, up = partial(page.keyboard.down, "d"), partial(page.keyboard.up, "d")
+    await hold_until(page, down, up, moved(bus, before), "the pose changed")
+
+
 async def wait_still(bus: Bus) -> None:
     """Return when the robot stands, which it must soon."""
 
@@ -78,11 +94,7 @@ async def test_a_program_drives_a_robot_and_when_it_vanishes_the_wheels_stop_and
         await one.say(do="take", robot="scout1")
         await one.wait(lambda: one.is_held, "held")
         before, driving = await pose(bus), asyncio.create_task(one.drive())
-
-        async def moved() -> bool:
-            return differs(before, await pose(bus))
-
-        await wait_until(moved, "the pose changed")
+        await wait_until(moved(bus, before), "the pose changed")
         one.socket.transport.abort()  # no goodbye
         await wait_still(bus)
         await wait_until(lambda: holds(bus, "watch-scout1"), "the behavior went on")
@@ -160,12 +172,7 @@ async def test_at_a_desk_a_person_watches_drives_by_keys_and_releases(served: Se
         await page.wait_for_selector(".robot[data-robot=scout1]:not(.is-stale)")
         await take(page)
         first, before = await shown(page), await pose(bus)
-        await page.keyboard.down("d")
-
-        async def moved() -> bool:
-            return differs(before, await pose(bus))
-
-        await wait_until(moved, "the pose changed")
+        await hold_key(page, bus, before)
 
         async def changed() -> bool:
             return await shown(page) != first
@@ -190,13 +197,7 @@ async def test_on_a_tablet_a_finger_on_the_pad_drives_and_a_lifted_one_stops(ser
         await take(page)
         before = await pose(bus)
         finger = Finger(page)
-        await finger.push_right()
-        await page.wait_for_selector("#pad.is-held")
-
-        async def moved() -> bool:
-            return differs(before, await pose(bus))
-
-        await wait_until(moved, "the pose changed")
+        await hold_until(page, finger.push_right, finger.lift, moved(bus, before), "the pose changed")
         await keep_picture(page, "tablet")
         await finger.lift()
         await page.wait_for_selector("#pad:not(.is-held)")
@@ -218,13 +219,7 @@ async def test_on_a_phone_that_loses_its_network_the_wheels_stop_and_the_behavio
         before = await pose(bus)
         await page.wait_for_selector(".robot[data-robot=scout1]:not(.is-stale)")
         finger = Finger(page)
-        await finger.push_right()
-        await page.wait_for_selector("#pad.is-held")
-
-        async def moved() -> bool:
-            return differs(before, await pose(bus))
-
-        await wait_until(moved, "the pose changed")
+        await hold_until(page, finger.push_right, finger.lift, moved(bus, before), "the pose changed")
         await keep_picture(page, "phone")
         cable.is_cut = True  # the finger stays where it is
         await wait_still(bus)
@@ -241,6 +236,12 @@ const buttons = () => [0, 1, 2, 3, 4, 5].map((n) => ({ pressed: n === 5 && windo
 const pad = () => ({ connected: true, axes: [1, 0, 0, 0], buttons: buttons() });
 Object.defineProperty(navigator, "getGamepads", { value: () => [pad()] });
 """
+
+SHOULDER = """(isHeld) => {
+  window.shoulder = isHeld;
+  return new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(() => seen())));
+}"""
+"""The page looks at the gamepad before each of its frames."""
 
 
 @pytest.mark.thorough
@@ -274,13 +275,9 @@ async def test_a_gamepad_drives_only_while_its_shoulder_button_is_held(served: S
         before = await pose(bus)
         await asyncio.sleep(1.0)
         assert not differs(before, await pose(bus)), "the stick alone does nothing"
-        await page.evaluate("() => { window.shoulder = true; }")
-
-        async def moved() -> bool:
-            return differs(before, await pose(bus))
-
-        await wait_until(moved, "the pose changed")
-        await page.evaluate("() => { window.shoulder = false; }")
+        hold, let_go = (partial(page.evaluate, SHOULDER, is_held) for is_held in (True, False))
+        await hold_until(page, hold, let_go, moved(bus, before), "the pose changed")
+        await let_go()
         await wait_still(bus)
 
 
@@ -303,12 +300,7 @@ async def test_an_emergency_stop_holds_against_the_hands_until_it_is_lifted(serv
         await asyncio.sleep(1.0)
         assert not differs(before, await pose(bus)), "the key that is still down was pressed before"
         await page.keyboard.up("d")
-        await page.keyboard.down("d")
-
-        async def moved() -> bool:
-            return differs(before, await pose(bus))
-
-        await wait_until(moved, "the pose changed")
+        await hold_key(page, bus, before)
         await page.keyboard.up("d")
 
 
