@@ -6,6 +6,7 @@ import asyncio
 import os
 import signal
 import time
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -17,15 +18,25 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
 SAID_WITHIN_S = 1.0
 TOLERANCE_S = 0.2  # of a machine that also runs other tests; the page's own rule is judged without a clock below
+LOOKS_EACH_S = 0.1  # as link.js has it: a page that does not run for longer cannot look meanwhile
 
 WATCH_BANNER = """
 window.said = null;
+window.ran = [];
 addEventListener("DOMContentLoaded", () => setInterval(() => {
+  window.ran.push(Date.now() / 1000);
   const isShown = !document.getElementById("blind").hidden;
-  if (isShown && window.said === null) window.said = Date.now() / 1000;
+  if (isShown && window.said === null) window.said = window.ran.at(-1);
   if (!isShown) window.said = null;
 }, 20));
 """
+
+
+async def said_after_s(page: Any, since_s: float) -> float:
+    """Return the seconds until the banner was shown, without those in which the machine did not let the page run."""
+    said_s, ran_s = await page.evaluate("() => [window.said, window.ran]")
+    times_s = [since_s, *(at_s for at_s in ran_s if since_s < at_s <= said_s)]
+    return float(sum(min(later - earlier, LOOKS_EACH_S) for earlier, later in pairwise(times_s)))
 
 
 async def test_the_age_of_what_is_shown_counts_from_the_newest_beat_that_came_back(stage: Stage) -> None:
@@ -75,7 +86,7 @@ async def test_a_page_that_is_cut_off_says_within_a_second_that_it_cannot_stop_a
         cut_s = time.time()
         await page.wait_for_selector("body.is-blind")
         await page.wait_for_function("() => window.said")  # the banner's observer runs a moment after
-        assert await page.evaluate("() => window.said") - cut_s < SAID_WITHIN_S + TOLERANCE_S
+        assert await said_after_s(page, cut_s) < SAID_WITHIN_S + TOLERANCE_S
         await page.get_by_text("THIS PAGE CANNOT STOP A ROBOT").wait_for()
         for button in await page.locator("button.emergency").all():
             assert await button.is_disabled()
