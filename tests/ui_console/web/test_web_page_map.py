@@ -178,9 +178,8 @@ async def test_a_tap_in_the_picture_sends_the_robot_to_that_place_on_the_floor(f
         async def tap_picture(column: float, row: float) -> None:
             """Tap there, shares of its width and height."""
             canvas = page.locator(".robot.is-large[data-robot=scout1]:not(.is-stale) canvas")
-            await canvas.wait_for()
             box = await canvas.bounding_box()
-            await page.mouse.click(box["x"] + column * box["width"], box["y"] + row * box["height"])
+            await canvas.click(position={"x": column * box["width"], "y": row * box["height"]})
 
         async with publishing(arc):
             await tap_picture(0.5, 0.2)
