@@ -7,6 +7,7 @@ import contextlib
 import json
 import os
 import signal
+import statistics
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -22,6 +23,8 @@ from backbone.wire import Envelope
 from resource_pool.arc_client import ask_stop, lift_stop, stop_robot
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
+
+HEALTHS = 8
 
 
 @pytest.fixture(scope="module")
@@ -167,18 +170,18 @@ def test_a_cause_in_a_story_can_be_asked_about(mission: RunningMission) -> None:
 def test_the_launcher_says_every_second_how_its_mission_is(mission: RunningMission) -> None:
     async def main() -> list[float]:
         stamps: list[float] = []
-        four = asyncio.Event()
+        enough = asyncio.Event()
 
         def heard(said: Envelope[MissionHealth]) -> None:
             stamps.append(said.stamp_s)
-            if len(stamps) == 4:
-                four.set()
+            if len(stamps) == HEALTHS:
+                enough.set()
 
         async with mission.bus() as bus:
             bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, heard)
-            await asyncio.wait_for(four.wait(), 20.0)
+            await asyncio.wait_for(enough.wait(), 5.0 * HEALTHS)
         return stamps
 
     stamps = asyncio.run(main())
-    # Of three pauses one may be longer on a busy machine; a change of the health shortens them.
-    assert sorted(later - earlier for earlier, later in pairwise(stamps[:4]))[1] < 1.3, stamps
+    # A busy machine makes some pauses longer; a change of the health shortens them.
+    assert statistics.median(later - earlier for earlier, later in pairwise(stamps[:HEALTHS])) < 1.3, stamps
