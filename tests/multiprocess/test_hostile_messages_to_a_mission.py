@@ -144,4 +144,4 @@ def assert_trace_says(trace: Path, rcs: list[str]) -> None:
 
 
 def lines_of(trace: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in trace.read_text().splitlines() if line.endswith("}")]
+    return [json.loads(line) for line in trace.read_text().rpartition("\n")[0].splitlines()]
