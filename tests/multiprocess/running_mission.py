@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import AbstractContextManager
 from pathlib import Path
 from subprocess import CompletedProcess
+from typing import Any
 
 from typer.testing import CliRunner
 
@@ -22,9 +24,11 @@ __all__ = [
     "marked",
     "mission_up",
     "runtime_directory",
+    "status_when_settled",
     "wait_gone",
 ]
 
+SETTLED_WITHIN_S = 30.0
 MISSION_XML = Path(__file__).parents[2] / "mission.xml"
 
 
@@ -44,3 +48,12 @@ def asked(mission: RunningMission, *words: str) -> CompletedProcess[str]:
     with runtime_directory(mission.environment["XDG_RUNTIME_DIR"]):
         done = CliRunner().invoke(app, [*words, "--mission", mission.name], catch_exceptions=False)
     return CompletedProcess(words, done.exit_code, done.stdout, done.stderr)
+
+
+def status_when_settled(mission: RunningMission) -> dict[str, Any]:
+    """Return its status as soon as it is whole: ARCs start a moment after the mission is ready."""
+    deadline = time.monotonic() + SETTLED_WITHIN_S
+    while (found := mission.status())["health"] != "ok" or found["problems"]:
+        assert time.monotonic() < deadline, f"{found}\n{mission.story()}"
+        time.sleep(0.05)
+    return found

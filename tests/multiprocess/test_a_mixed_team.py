@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from running_mission import RunningMission, mission_up
+from running_mission import RunningMission, mission_up, status_when_settled
 
 from resource_pool.localization import AskPose, Pose
 
@@ -59,7 +59,6 @@ async def test_all_of_a_mixed_team_is_driven_by_hand_and_goes_on_and_the_schedul
             assert wanted <= applied.keys(), said
             if "move" in wanted:
                 assert math.dist(await place_of(mission, robot), before) > MOVED_M
-        health = mission.status()
-        assert (health["health"], health["absent"]) == ("ok", [])
+        assert status_when_settled(mission)["absent"] == []
         assert mission.down() == 0
     judged(trace)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from running_mission import BIN, RunningMission, mission_up
+from running_mission import BIN, RunningMission, mission_up, status_when_settled
 
 from backbone.component.messages import AskState, ComponentState
 from backbone.keys import Conversation
@@ -39,7 +39,7 @@ async def test_down_has_the_scout_drive_home_and_leaves_nothing() -> None:
         names = {one["name"] for one in mission.status()["components"]}
         assert not {"end-of-day", "drive-home"} & names
         assert mission.component("launcher")["feedback"] == "all ready; at the end: end-of-day"
-        assert mission.status()["health"] == "ok"
+        status_when_settled(mission)
         reached = asyncio.Event()
 
         def hear(_event: Envelope[Any]) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from free_ports import free_port
 from prometheus_client.parser import text_string_to_metric_families
-from running_mission import BIN, RunningMission, asked, mission_up
+from running_mission import BIN, RunningMission, asked, mission_up, status_when_settled
 from tool_at_a_port import tool_at
 
 from resource_pool.localization import AskPose, Pose
@@ -37,15 +37,6 @@ def mission() -> RunningMission:
     with mission_up() as running:
         running.wait_for_components("watch-scout1", "watch-scout2")
         yield running
-
-
-def status_when_settled(mission: RunningMission) -> dict[str, Any]:
-    """Return its status as soon as it is whole: ARCs start a moment after the mission is ready."""
-    deadline = time.monotonic() + SEEN_WITHIN_S
-    while (found := mission.status())["health"] != "ok" or found["problems"]:
-        assert time.monotonic() < deadline, f"{found}\n{mission.story()}"
-        time.sleep(0.05)
-    return found
 
 
 def test_core_services_become_ready_in_the_papers_order(mission: RunningMission) -> None:
