@@ -108,7 +108,7 @@ async def test_where_no_localizer_is_the_map_has_the_places_of_the_simulator_and
         truth = await pose(bus, "scout3")
         assert math.hypot(shown["scout3"]["x_m"] - truth.x_m, shown["scout3"]["y_m"] - truth.y_m) < 0.05
         assert {body["source"] for body in one.view["bodies"]} == {"from the simulator"}
-        assert not any(body["is_stale"] for body in one.view["bodies"])
+        await one.wait(lambda: not any(body["is_stale"] for body in one.view["bodies"]), "fresh places of all robots")
         await one.wait(lambda: one.view["floor"] is not None, "a floor")
 
 
