@@ -188,9 +188,14 @@ def _run_batch(batch: Sequence[int], *, chaos: bool) -> tuple[CampaignCount, int
 
 
 def _run_quietly(seed: int, supervised: bool, chaos: bool, faults: Sequence[AnyFault] | None = None) -> MissionRun:
-    """Run the mission without logging, because components log every fault and the audit has all relevant events."""
-    before = logging.root.manager.disable
+    """Run the mission without logging, because components log every fault and the audit has all relevant events.
+
+    A component that ends by a fault switches logging on again, in case its author silenced it; a handler that drops all
+    keeps that from the terminal.
+    """
+    before, drop = logging.root.manager.disable, logging.NullHandler()
     logging.disable(logging.CRITICAL)
+    logging.root.addHandler(drop)
     try:
         if supervised:
             struck = None if faults is None else [each for each in faults if isinstance(each, SupervisionFault)]
@@ -200,6 +205,7 @@ def _run_quietly(seed: int, supervised: bool, chaos: bool, faults: Sequence[AnyF
         )
         return run_mission(seed, chaos=chaos, faults=said)
     finally:
+        logging.root.removeHandler(drop)
         logging.disable(before)
 
 

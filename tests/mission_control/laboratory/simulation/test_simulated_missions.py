@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import os
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from collections import Counter
 import pytest
 from examples import share
 
+from backbone.component.process import exit_code_of
+from backbone.errors import LinkError
 from mission_control.laboratory.simulation import campaign
 from mission_control.laboratory.simulation.campaign import simulate
 from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
@@ -99,3 +102,17 @@ def test_2000_missions_with_message_loss_and_kills_keep_the_laws() -> None:
     outcome = simulate(0, 2000, chaos=True, tell=print)
     assert outcome.finding is None, "\n".join(outcome.finding.lines())
     assert outcome.count.runs == 2000
+
+
+def test_a_component_that_switches_logging_on_prints_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def ends_by_a_refusal(seed: int, **_how: object) -> MissionRun:
+        exit_code_of(LinkError("no hub answers"), "mission_control/one")
+        return mission(seed, chaos=False)
+
+    mission(0, chaos=False)
+    monkeypatch.setattr(campaign, "run_mission", ends_by_a_refusal)
+    monkeypatch.setattr(logging.root, "handlers", [])  # as in the processes of a campaign
+    assert simulate(0, 1, chaos=False, tell=print, processes=1).finding is None
+    assert capsys.readouterr().err == ""
