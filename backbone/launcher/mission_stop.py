@@ -98,6 +98,6 @@ async def stop_other_hosts(bus: Bus, others: OtherHosts, changed: asyncio.Event)
 
 
 async def _ask_to_stop(bus: Bus, addresses: Iterable[str]) -> None:
-    """Ask all at once; whoever does not answer soon is left to end by itself."""
+    """Ask all at once; a component that does not answer soon ends by itself."""
     stops = (bus.ask(at, Stop(REASON), Stopping, within_s=SOON_S) for at in addresses)
     await asyncio.gather(*stops, return_exceptions=True)

@@ -82,7 +82,7 @@ def results_of(
     with ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(orders_end,)) as pool:
         chunks = [orders[at : at + chunk] for at in range(0, len(orders), chunk)]
         try:
-            # Not by ``pool.map``, which cancels what nobody waits for: Python 3.11 then prints a bug of its own.
+            # Not by ``pool.map``, which cancels calls that are not awaited: Python 3.11 then prints a bug of its own.
             for done in [pool.submit(_worked, work, part) for part in chunks]:
                 yield from done.result()
         except BaseException as error:

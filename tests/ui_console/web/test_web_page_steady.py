@@ -45,18 +45,28 @@ async def centers(page: Any, *names: str) -> dict[str, tuple[int, int]]:
     return {name: (round(box["x"] + box["width"] / 2), round(box["y"] + 10)) for name, box in boxes.items()}
 
 
+async def ask_for_it(stage: Stage, page: Any) -> None:
+    """Press the button; the robot is not granted yet."""
+    stage.placer.on_arc = lambda arc: None
+    await card(page).get_by_role("button", name="Take over").click()
+    await page.wait_for_selector("body.is-asking")
+
+
+async def grant(stage: Stage, page: Any) -> None:
+    """Grant what the page asks for."""
+    for arc in stage.placer.arcs.values():
+        await arc.grant()
+    await page.wait_for_selector("body[data-held=scout1]")
+
+
 @pytest.mark.parametrize("size", ALL_SIZES)
 async def test_pad_and_buttons_stay_when_the_robot_is_granted_and_when_its_commands_are_known(
     stage: Stage, size: str
 ) -> None:
     async with page_at(stage, size) as page:
-        stage.placer.on_arc = lambda arc: None
-        await card(page).get_by_role("button", name="Take over").click()
-        await page.wait_for_selector("body.is-asking")
+        await ask_for_it(stage, page)
         waiting = await centers(page, "pad", "halt", "release")
-        for arc in stage.placer.arcs.values():
-            await arc.grant()
-        await page.wait_for_selector("body[data-held=scout1]")
+        await grant(stage, page)
         assert await centers(page, "pad", "halt", "release") == waiting, "granted"
         held = await centers(page, *HANDS)
         stage.know_commands([CAPTURE, *lit_types("lit_drive")], HARDWARE)
@@ -69,14 +79,10 @@ async def test_the_buttons_of_other_robots_stay_when_a_robot_is_granted_and_when
     stage: Stage, size: str
 ) -> None:
     async with page_at(stage, size) as page:
-        stage.placer.on_arc = lambda arc: None
-        await card(page).get_by_role("button", name="Take over").click()
-        await page.wait_for_selector("body.is-asking")
+        await ask_for_it(stage, page)
         waiting = await page.evaluate(OTHERS)
         assert "scout2 Stop" in waiting
-        for arc in stage.placer.arcs.values():
-            await arc.grant()
-        await page.wait_for_selector("body[data-held=scout1]")
+        await grant(stage, page)
         assert await page.evaluate(OTHERS) == waiting, "granted"
         stage.know_commands([CAPTURE, *lit_types("lit_drive")], HARDWARE)
         await page.get_by_role("combobox", name="Taken with").wait_for()
