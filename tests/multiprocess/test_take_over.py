@@ -286,18 +286,19 @@ async def test_a_console_interrupts_the_watcher_at_once_and_it_goes_on_afterward
 
 
 async def test_the_watcher_hears_by_whom_while_the_console_process_drives(mission: RunningMission) -> None:
-    async with observed(mission) as (bus, clock, _watch), console_process(mission) as process:
+    async with observed(mission) as (bus, clock, _watch):
         await watcher_holds_scout1(bus, clock, BEGUN_WITHIN_S)
-        assert process.stdin is not None
-        process.stdin.write(TURN.encode())
-        await process.stdin.drain()
-        granted, applied = await line(process, "granted"), await line(process, "applied")
-        state = await watcher_state(bus)
-        before = await bus.ask(WORLD, AskPose("scout1"), Pose, within_s=2)
-        process.stdin.write(b'{"at_s":0.5,"release":true}\n')
-        released = await line(process, "released")
-        await process.wait()
-        after = await bus.ask(WORLD, AskPose("scout1"), Pose, within_s=2)
+        async with console_process(mission) as process:
+            assert process.stdin is not None
+            process.stdin.write(TURN.encode())
+            await process.stdin.drain()
+            granted, applied = await line(process, "granted"), await line(process, "applied")
+            state = await watcher_state(bus)
+            before = await bus.ask(WORLD, AskPose("scout1"), Pose, within_s=2)
+            process.stdin.write(b'{"at_s":0.5,"release":true}\n')
+            released = await line(process, "released")
+            await process.wait()
+            after = await bus.ask(WORLD, AskPose("scout1"), Pose, within_s=2)
     assert state.suspended_because == f"higher by console-{process.pid}-drive"
     assert applied["at_s"] - granted["asked_s"] < SLICE_S, (granted, applied)  # type: ignore[operator]
     assert granted["after_s"] == pytest.approx(granted["at_s"] - granted["asked_s"])  # type: ignore[operator]
