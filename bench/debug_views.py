@@ -106,7 +106,7 @@ async def measure(count: int) -> None:
         ratio=round(bare_s / viewed_s, 4),
         ratio_looked_at=round(looked[1] / looked[0], 4),
     )
-    await asyncio.gather(viewed.bus.close(), bare.bus.close())
+    await asyncio.gather(viewed.leave_bus(), bare.leave_bus())
 
 
 def main() -> None:
