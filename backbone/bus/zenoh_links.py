@@ -3,8 +3,7 @@
 After a cut, a new address, or a loss of many packets, a new connection of zenoh 1.10 may be *deaf*: it stays up and
 keeps itself alive, but passes no message to the client for ever. The hub declares a token, which a client finds over
 every other connection. If a client does not find it, this file ends the connection; then the session connects again by
-itself. While more than keep-alives come over a connection, the answer may wait behind other messages: it is looked for
-again.
+itself. A connection over which more than keep-alives came is not deaf: the answer waits behind other messages.
 """
 
 from __future__ import annotations
@@ -86,12 +85,13 @@ class Links:
         self._session.liveliness().get(KEY_OF_HUB, answers, timeout=self._answer_within_s)
 
     def _found_nothing(self, port: int, looks_left: int, most_bytes: int) -> None:
-        """Look again, or end the connection if no more bytes came than a deaf link passes, ``most_bytes``."""
+        """Look again or end the connection, unless more bytes came than a deaf link passes, ``most_bytes``."""
         if port not in self._next_look:  # this connection has ended
             return
-        is_heard = received_bytes(port) > most_bytes  # it may have been the last message before it became deaf
-        if is_heard or looks_left:
-            self._look_later(port, max(looks_left, 1))
+        if received_bytes(port) > most_bytes:
+            return
+        if looks_left:
+            self._look_later(port, looks_left)
         else:
             log.warning("the link from port %d to the hub passes no messages, so it is made anew", port)
             self._answer_within_s = min(2 * self._answer_within_s, SLOWEST_ANSWER_S)

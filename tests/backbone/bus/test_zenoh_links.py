@@ -130,7 +130,7 @@ async def test_a_link_that_only_keeps_itself_alive_is_replaced() -> None:
     await hub.close()
 
 
-async def test_a_link_stays_while_pictures_come_although_answers_are_late(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_link_over_which_pictures_come_stays_although_answers_are_late(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(zenoh_links, "ANSWER_WITHIN_S", 0.4)
     endpoint, clock = free_endpoint(), MissionClock.started_now()
     hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
@@ -147,8 +147,6 @@ async def test_a_link_stays_while_pictures_come_although_answers_are_late(monkey
         sending = asyncio.create_task(send_pictures())
         try:
             assert await changes(bus, 2, within_s=3.0) == [True]  # without pictures it is replaced after 1 s
-            sending.cancel()
-            assert await changes(bus, 3) == [True, False, True]
         finally:
             sending.cancel()
             await bus.close()
