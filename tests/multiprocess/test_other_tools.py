@@ -20,7 +20,7 @@ from websockets.typing import Subprotocol
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
 
 CAMERA = "/robots/scout1/camera"
-SEEN_WITHIN_S = 30.0
+SEEN_WITHIN_S = 120.0  # on a full machine: who looks at a mission goes behind all others
 ENDED_WITHIN_S = 30.0
 
 
