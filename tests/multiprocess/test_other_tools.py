@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import subprocess
 import sys
@@ -32,6 +33,11 @@ def mission() -> Iterator[RunningMission]:
 
 @pytest.mark.thorough
 async def test_foxglove_sees_the_cameras_of_a_mission(mission: RunningMission) -> None:
+    """The bridge starts after each watcher had a slice: one that starts before may miss the first ARC's pictures."""
+    until_s = time.monotonic() + SEEN_WITHIN_S
+    while not all(any(f"runs: watch-{one}-capture" in line for line in mission.lines) for one in ("scout1", "scout2")):
+        assert time.monotonic() < until_s, mission.story()
+        await asyncio.sleep(0.1)
     port = free_port()
     with tool_at(mission, "bridge", port):
         protocol = [Subprotocol("foxglove.sdk.v1")]
