@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import subprocess
 import sys
@@ -33,16 +32,11 @@ def mission() -> Iterator[RunningMission]:
 
 @pytest.mark.thorough
 async def test_foxglove_sees_the_cameras_of_a_mission(mission: RunningMission) -> None:
-    """The bridge starts after each watcher had a slice: one that starts before may miss the first ARC's pictures."""
-    until_s = time.monotonic() + SEEN_WITHIN_S
-    while not all(any(f"runs: watch-{one}-capture" in line for line in mission.lines) for one in ("scout1", "scout2")):
-        assert time.monotonic() < until_s, mission.story()
-        await asyncio.sleep(0.1)
     port = free_port()
     with tool_at(mission, "bridge", port):
         protocol = [Subprotocol("foxglove.sdk.v1")]
         async with connect(f"ws://127.0.0.1:{port}", subprotocols=protocol, max_size=None) as link:
-            topics: set[str] = set()
+            topics, wanted = set[str](), dict[str, object]()
             until_s = time.monotonic() + SEEN_WITHIN_S
             async for got in link:
                 assert time.monotonic() < until_s, topics
@@ -53,8 +47,9 @@ async def test_foxglove_sees_the_cameras_of_a_mission(mission: RunningMission) -
                     topics.add(channel["topic"])
                     if channel["topic"] == CAMERA:
                         assert channel["schemaName"] == "foxglove.RawImage"
-                        wanted = [{"id": 1, "channelId": channel["id"]}]
-                        await link.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+                        wanted = {"op": "subscribe", "subscriptions": [{"id": 1, "channelId": channel["id"]}]}
+                if wanted:  # again with each word: the SDK (0.30.3) advertises a channel before it knows it
+                    await link.send(json.dumps(wanted))
 
 
 @pytest.mark.parametrize(

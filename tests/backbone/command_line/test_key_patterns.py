@@ -1,4 +1,4 @@
-"""A pattern that no key can match is refused, because whoever listens to it waits for ever."""
+"""A pattern that no key can match is refused, because its listener would wait for ever."""
 
 from __future__ import annotations
 

@@ -295,7 +295,7 @@ async def test_a_dialog_asks_for_what_is_required_and_keeps_answers_that_were_re
 @pytest.mark.thorough
 @pytest.mark.parametrize("dialog", ["ask", "choose"])
 async def test_a_dialog_shown_again_at_once_stays_open(tmp_path: Path, dialog: str) -> None:
-    """The browser tells of the first one's end when the second is shown already."""
+    """The browser sends the close event of the first dialog when the second one is open already."""
     with served(tmp_path / "guard.xml") as address:
         async with page_at("desktop", address) as page:
             is_open = await page.evaluate(SHOWN_AGAIN, dialog)
