@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -13,14 +12,12 @@ from held_robot import FORWARD, REPEAT_S, HeldRobot
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.bus.clock import VirtualClock, VirtualLoop, run_virtual
+from backbone.bus.clock import VirtualClock, VirtualLoop
 from resource_pool.arc_client import EmergencyStopped
-from resource_pool.commands import Drive as ArcDrive
 from resource_pool.commands import Halt as ArcHalt
 from resource_pool.messages import GiveCommand
 from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, GiveWish, HaltWish, MoveWish
 from ui_console.session.controls import LOOK_EVERY_S
-from ui_console.session.scripted import ScriptDriver
 
 
 @given(
@@ -137,26 +134,6 @@ def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
 
         with asyncio.Runner(loop_factory=StallingLoop) as runner:
             runner.run(main())
-
-    return run
-
-
-@pytest.fixture
-def scripted(local_mission: Any) -> Callable[[Scene], None]:
-    """Like ``stage``, with a console that the scene starts."""
-
-    def run(scene: Scene) -> None:
-        async def main() -> None:
-            async with local_mission("iros2001") as network:
-                placer = FakePlacer(network, VirtualClock(), {})
-                on = HeldRobot(placer, is_scripted=True)
-                try:
-                    await scene(on)
-                finally:
-                    await on.rc.close()
-                    await placer.close()
-
-        run_virtual(main())
 
     return run
 
@@ -305,64 +282,6 @@ def test_a_robot_that_was_stopped_and_freed_before_it_is_granted_is_driven_by_th
     stage(scene)
 
 
-async def play(on: HeldRobot, lines: list[tuple[float, str | None]]) -> tuple[int, list[str]]:
-    """Write these lines into the script's pipe, each after its pause; return how it ended and the words it said."""
-    said: list[bytes] = []
-    driver = ScriptDriver(said.append)
-    on.make_console(show=driver.show, work=driver.drive)
-    living = asyncio.create_task(on.console.run())
-    for pause_s, line in lines:
-        await on.clock.sleep_s(pause_s)
-        driver.feed(line)
-    await living
-    return driver.exit_code(on.console), [json.loads(line)["event"] for line in said]
-
-
-def test_a_script_drives_on_after_a_lift_only_when_it_halted_first(scripted: Callable[[Scene], None]) -> None:
-    async def scene(on: HeldRobot) -> None:
-        drive = '{"at_s":%s,"left_rad_s":4,"right_rad_s":4}'
-        playing = asyncio.create_task(
-            play(
-                on, [(0.0, drive % 0), (3.0, drive % 3), (1.0, '{"at_s":4,"halt":true}'), (1.0, drive % 5), (1.0, None)]
-            )
-        )
-        await on.held()
-        await on.clock.sleep_s(1.0)
-        assert on.drives()
-        on.stop()
-        await on.clock.sleep_s(0.5)
-        on.lift()
-        on.arc.commands.clear()
-        await on.clock.sleep_s(2.0)
-        assert not on.drives(), "neither the line that was repeated nor the next one"
-        arc = on.arc
-        code, words = await playing
-        drives = [at_s for at_s, _epoch, command in arc.commands if isinstance(command, ArcDrive)]
-        halts = [at_s for at_s, _epoch, command in arc.commands if isinstance(command, ArcHalt)]
-        assert drives
-        assert min(drives) > max(halts)
-        assert (code, "stop" in words) == (5, True)
-
-    scripted(scene)
-
-
-def test_a_script_stops_robots_before_its_grant_and_at_once(scripted: Callable[[Scene], None]) -> None:
-    async def scene(on: HeldRobot) -> None:
-        playing = asyncio.create_task(
-            play(
-                on,
-                [(0.5, '{"stop_robot":"scout1","reason":"a child"}'), (2.0, '{"at_s":0,"release":true}'), (0.0, None)],
-            )
-        )
-        await on.clock.sleep_s(0.6)
-        state = on.latch.state
-        assert (state.is_stopped, state.by, state.reason) == (True, "anna", "a child")
-        await on.held()
-        await playing
-
-    scripted(scene)
-
-
 def test_a_robot_that_does_not_answer_its_stop_gets_no_motion_from_the_console_that_stopped_it(
     stage: Callable[[Scene], None],
 ) -> None:
@@ -405,26 +324,3 @@ def test_a_second_stop_that_is_given_up_ends_no_repetition_of_the_first(stage: C
         assert "scout1" not in on.console.feed.unanswered
 
     stage(scene)
-
-
-def test_a_script_moves_nothing_after_a_stop_of_its_own_robot_that_is_not_answered(
-    scripted: Callable[[Scene], None],
-) -> None:
-    async def scene(on: HeldRobot) -> None:
-        drive, stop = '{"at_s":0,"left_rad_s":4,"right_rad_s":4}', '{"stop_robot":"scout1"}'
-        playing = asyncio.create_task(play(on, [(0.0, drive), (2.0, stop), (6.0, None)]))
-        await on.held()
-        await on.clock.sleep_s(1.0)
-        assert on.drives()
-        away = on.placer.network.servers.pop("resource_pool/scout1")
-        await on.clock.sleep_s(1.2)
-        on.arc.commands.clear()
-        await on.clock.sleep_s(2.0)
-        assert not on.drives()
-        on.placer.network.servers["resource_pool/scout1"] = away
-        await on.clock.sleep_s(1.0)
-        assert on.latch.state.is_stopped
-        code, _ = await playing
-        assert code == 5
-
-    scripted(scene)
