@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Sequence
+from itertools import chain
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
 from backbone.scheduling.planner import Hold, Slot
-from backbone.scheduling.prefix_maximum import PrefixMaximum
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
@@ -32,8 +32,8 @@ def starts_s(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[floa
     ends_s: dict[str, float] = {}
     taken_s: dict[str, float] = {}
     all_equal = len({(arc.path[:-1], arc.path[-1][1]) for arc in order}) == 1
-    exclusive: defaultdict[str, PrefixMaximum] = defaultdict(PrefixMaximum)
-    sharers: defaultdict[str, PrefixMaximum] = defaultdict(PrefixMaximum)
+    exclusive: defaultdict[str, list[ArcEntry]] = defaultdict(list)
+    sharers: defaultdict[str, list[ArcEntry]] = defaultdict(list)
     starts: list[float] = []
     for arc in order:
         if not table.usable(arc):
@@ -52,11 +52,11 @@ def starts_s(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[floa
             if free_s > start_s and not table.fits(arc, [holder]):
                 start_s = free_s
         if not all_equal:
-            above = [*(exclusive[rc] for rc in arc.uses), *(sharers[rc] for rc in alone if rc in sharers)]
-            if any(one.largest(arc.path) > -math.inf for one in above):
+            before = chain(*[exclusive[rc] for rc in arc.uses], *[sharers[rc] for rc in alone])
+            if any(one.goes_before(arc) for one in before):
                 start_s = math.inf  # higher ARCs need not end once they run
             for rc in arc.uses:
-                (sharers if rc in arc.shares else exclusive)[rc].add(arc.path, start_s)
+                (sharers if rc in arc.shares else exclusive)[rc].append(arc)
         starts.append(start_s)
         if start_s < math.inf:
             for rc in alone:

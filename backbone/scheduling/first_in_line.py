@@ -85,14 +85,12 @@ class _Delayed(NamedTuple):
     """Why an ARC could not start when this was last asked.
 
     Attributes:
-        version: Sum of the versions of its RCs, and of their service, at that time; -1: the answer is not kept.
         other: The ARC whose reservation a start would delay, the first to ask about again.
-        reserved: That reservation.
+        reserved: That reservation, which depends on the RCs of the ARC, too; None: the answer is not kept.
     """
 
-    version: int
     other: ArcEntry
-    reserved: _Reserved
+    reserved: _Reserved | None
 
 
 class FirstInLine:
@@ -143,35 +141,31 @@ class FirstInLine:
         others = [user for user in self._state.users[rc] if user.queued and user not in new]
         return self._table.first_in_order([user for user in others if self._table.usable(user)]) is first
 
-    def takes_from_others(self, arc: ArcEntry, holders: Sequence[ArcEntry], now_s: float) -> bool:
-        """Return whether a start now would take time from a higher ARC or from the first in line at an RC.
-
-        Args:
-            arc: A waiting ARC.
-            holders: The other ARCs that hold an RC of it.
-            now_s: Time of its start.
-        """
+    def takes_from_others(self, arc: ArcEntry, now_s: float) -> bool:
+        """Return whether a start of a waiting ARC now would take time from a higher one or from the first in line."""
         self._look(now_s)
         if self._makes_way(arc) or self._still_delays(arc):
             return True
         at = {rc: self.at(rc) for rc in arc.uses}
         chain = _Chain((arc,), self._ahead(arc, at))
-        found = self._delayed_by(chain, at, holders, now_s)
+        found = self._delayed_by(chain, at, now_s)
         if found is None:
             return False
         other, reserved = found
-        self._delayed[arc] = _Delayed(-1 if reserved.rcs & chain.ahead else self._version_at(arc), other, reserved)
+        is_kept, rcs = not reserved.rcs & chain.ahead, reserved.rcs | arc.touches
+        kept = _Reserved(reserved.start_s, rcs, reserved.until_s, self._looked) if is_kept else None
+        self._delayed[arc] = _Delayed(other, kept)
         return True
 
     def _look(self, now_s: float) -> None:
         """Take note of the time and of all changes since the last look; reservations that they concern are outdated."""
         state = self._state
-        for kept in (self._reserved, self._around, self._delayed):
-            if len(kept) > MOST_KEPT * len(state.arcs):
-                kept.clear()  # they may hold ARCs that left
         changed, state.concerned = state.concerned, 0
         if not changed and now_s == self._looked_s:
             return
+        for kept in (self._reserved, self._around, self._delayed):
+            if len(kept) > MOST_KEPT * len(state.arcs):
+                kept.clear()  # they may hold ARCs that left
         self._looked += 1
         self._looked_s = now_s
         self._changes = [*self._changes[-MOST_LOOKS:], changed]
@@ -201,11 +195,9 @@ class FirstInLine:
     def _still_delays(self, arc: ArcEntry) -> bool:
         """Return whether the earlier answer stands: what a start would delay has only come nearer. False: unknown."""
         known = self._delayed.get(arc)
-        return known is not None and known.version == self._version_at(arc) and self._stands(known.reserved)
+        return known is not None and known.reserved is not None and self._stands(known.reserved)
 
-    def _delayed_by(
-        self, chain: _Chain, at: Mapping[str, ArcEntry | None], holders: Sequence[ArcEntry], now_s: float
-    ) -> _Found | None:
+    def _delayed_by(self, chain: _Chain, at: Mapping[str, ArcEntry | None], now_s: float) -> _Found | None:
         """Return the first reservation found that a start of the candidate now would delay; None if there is none."""
         (arc,) = chain.arcs
         firsts = dict.fromkeys(first for first in at.values() if first is not None)
@@ -213,11 +205,11 @@ class FirstInLine:
             last = self._delayed[arc].other
             is_higher = last.queued and last.touches & arc.touches and last.goes_before(arc)
             if is_higher or (last in firsts and arc not in firsts):  # then it counts, and mostly it is it again
-                delayed = self._first_delayed([last], chain, holders, now_s)
+                delayed = self._first_delayed([last], chain, now_s)
                 if delayed is not None:
                     return delayed
         if arc not in firsts:
-            delayed = self._first_delayed(firsts, chain, holders, now_s)
+            delayed = self._first_delayed(firsts, chain, now_s)
             if delayed is not None:
                 return delayed
         users = dict.fromkeys(user for rc in arc.uses for user in self._state.users[rc] if user.queued)
@@ -227,21 +219,20 @@ class FirstInLine:
             # Equality is not transitive: two ARCs can each be first at a common RC. The lower one then waits.
             higher_waits = any(map(self._table.usable, higher_ones))
             ahead = set() if higher_waits else {rc for rc, first in at.items() if first is arc}
-            delayed = self._first_delayed([one for one in firsts if ahead.isdisjoint(one.uses)], chain, holders, now_s)
+            delayed = self._first_delayed([one for one in firsts if ahead.isdisjoint(one.uses)], chain, now_s)
             if delayed is not None:
                 return delayed
         else:
             # An ARC for which RCs are being freed is not the first in line behind a higher one.
             others += [one for one in users if self._is_being_freed_for(one, arc)]
-        return self._first_delayed(others, chain, holders, now_s)
+        return self._first_delayed(others, chain, now_s)
 
-    def _first_delayed(
-        self, others: Iterable[ArcEntry], chain: _Chain, holders: Sequence[ArcEntry], now_s: float
-    ) -> _Found | None:
+    def _first_delayed(self, others: Iterable[ArcEntry], chain: _Chain, now_s: float) -> _Found | None:
         """Return the first of the others' reservations that the candidate, beside holders with room for it, delays."""
         (arc,) = chain.arcs
-        fits, end_s, shared = self._table.fits, self._must_be_done_s(arc, now_s), arc.touches & ~arc.excludes
-        crowd = [holder for holder in holders if holder.touches & shared and fits(arc, [holder])]
+        fits, end_s = self._table.fits, self._must_be_done_s(arc, now_s)
+        sharers = dict.fromkeys(holder for rc in arc.shares for holder in self._state.rcs[rc].holders)
+        crowd = [holder for holder in sharers if holder is not arc and fits(arc, [holder])]
         for other in others:
             beside = dict.fromkeys([other, *crowd])  # a holder that is being revoked can be the first in line again
             if other is not arc and not fits(arc, beside) and self._table.usable(other):

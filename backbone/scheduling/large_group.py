@@ -10,7 +10,7 @@ Source: decision 0011.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
@@ -64,12 +64,10 @@ class LargeGroupPlanner:
     def due(self, now_s: float) -> Turn | None:
         """Return a turn whose time is now, of the most senior candidate; after None there are no candidates."""
         table = self._table
-        possible = self._possible(now_s)
-        self._candidates = dict.fromkeys(possible)
-        for arc, holders in possible.items():
-            del self._candidates[arc]
-            if self._firsts.takes_from_others(arc, holders, now_s):
+        for arc in self._possible(now_s):
+            if self._firsts.takes_from_others(arc, now_s):
                 continue
+            holders = [*table.holders(arc)]
             staying = [one for one in holders if table.stands_until_s(one, arc, now_s) > now_s + INSTANT_S]
             if not table.fits(arc, staying):
                 continue  # each holder alone leaves it room, but all together do not
@@ -82,8 +80,8 @@ class LargeGroupPlanner:
             return turn
         return None
 
-    def _possible(self, now_s: float) -> dict[ArcEntry, list[ArcEntry]]:
-        """Return the candidates that no single holder keeps from starting now, most senior first, and their holders.
+    def _possible(self, now_s: float) -> Iterator[ArcEntry]:
+        """Remove the candidates, most senior first; yield those that no single holder keeps from starting now.
 
         Behind a higher first in line, no reservation but this order keeps one of them from taking every gap.
         """
@@ -91,7 +89,8 @@ class LargeGroupPlanner:
         table, state, blocked, soon_s = self._table, self._state, self._blocked, now_s + INSTANT_S
         if len(blocked) > 2 * len(state.arcs):
             blocked.clear()  # it may hold ARCs that left
-        possible: dict[ArcEntry, list[ArcEntry]] = {}
+        versions, service_version = state.rc_versions, state.service_version
+        left: list[ArcEntry] = []
         for arc in self._candidates:
             if arc.state is not RequestState.WAITING:
                 continue
@@ -99,20 +98,23 @@ class LargeGroupPlanner:
             if (
                 known is not None
                 and soon_s < known.until_s
-                and known.version == state.rc_versions.get(known.rc, 0) + state.service_version
+                and known.version == versions.get(known.rc, 0) + service_version
             ):
                 continue
-            holders = table.holders(arc)
-            blocker = table.blocker(arc, holders, now_s)
+            left.append(arc)
+        seniority = state.fairness.seniority
+        left.sort(key=lambda arc: seniority(arc, now_s))
+        self._candidates = dict.fromkeys(left)
+        for arc in left:
+            del self._candidates[arc]
+            blocker = table.blocker(arc, table.holders(arc), now_s)
             if blocker is not None:
                 ends = blocker.state is RequestState.RUNNING and not blocker.goes_before(arc)
                 rc = next(rc for rc in arc.uses if rc in blocker.uses)
-                version = state.rc_versions.get(rc, 0) + state.service_version
+                version = versions.get(rc, 0) + service_version
                 blocked[arc] = _Blocked(rc, version, blocker.end_s if ends else math.inf)
             elif table.usable(arc):
-                possible[arc] = holders
-        by_seniority = sorted(possible, key=lambda arc: state.fairness.seniority(arc, now_s))
-        return {arc: possible[arc] for arc in by_seniority}
+                yield arc
 
     def _examine(self) -> None:
         """Make those ARCs candidates again that are concerned by changes since the last examination.
@@ -120,30 +122,30 @@ class LargeGroupPlanner:
         These are the users of an RC, and ARCs that may wait for one of its users at another RC.
         """
         users, bits, held_alone = self._state.users, self._state.bits, self._state.held_alone
+        waiting, candidates = RequestState.WAITING, self._candidates
         firsts: dict[str, ArcEntry | None] = {}
-        elsewhere: dict[str, None] = {}
+        elsewhere, settled = list[str](), held_alone  # where an RC is held alone, the holder's slice is not over
         for rc, joined in self._near.items():
             if joined and self._firsts.is_first_without(rc, joined):
-                self._candidates.update(dict.fromkeys(joined))  # no other may start because these wait, too
+                candidates.update(dict.fromkeys(joined))  # no other may start because these wait, too
                 continue
             for arc in users.get(rc, ()):
-                if arc.state is RequestState.WAITING:
-                    self._candidates[arc] = None
-                free = arc.touches & ~held_alone  # elsewhere the holder's slice is not over
-                if not free or not arc.queued:
+                if arc.state is waiting:
+                    candidates[arc] = None
+                if not arc.queued or not arc.touches & ~settled:
                     continue
                 for other in arc.uses:
-                    if not free & bits[other] or other in elsewhere:
+                    if settled & bits[other]:
                         continue
                     if other not in firsts:
                         firsts[other] = self._firsts.at(other)
                     first = firsts[other]
                     if first is None or first is arc or first.level is not arc.level:
-                        elsewhere[other] = None  # an ARC may wait there only because this one is first in line
+                        elsewhere.append(other)  # an ARC may wait there only because this one is first in line
+                        settled |= bits[other]
         for rc in elsewhere:
-            for arc in users[rc]:
-                if arc.state is RequestState.WAITING and not arc.touches & held_alone:
-                    self._candidates[arc] = None
+            free = [arc for arc in users[rc] if arc.state is waiting and not arc.touches & held_alone]
+            candidates.update(dict.fromkeys(free))
         self._near.clear()
 
     def forgotten(self, group: Sequence[ArcEntry], now_s: float) -> ArcEntry | None:

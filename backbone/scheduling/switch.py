@@ -53,7 +53,7 @@ class Switching:
             AssertionError: The planner, one's own perhaps, is wrong: the ARC does not wait, or its RCs are not free.
         """
         self._require(arc, RequestState.WAITING)
-        holders = self._schedule.table.holders(arc)
+        holders = [*self._schedule.table.holders(arc)]
         if not self._schedule.table.fits(arc, holders):
             raise AssertionError(
                 f"the planner connects {arc.name}, but {', '.join(holder.name for holder in holders)} holds its RCs"

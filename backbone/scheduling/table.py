@@ -14,7 +14,7 @@ Source: IROS 2001, "RC manager"; RAM 2002, "The RC Scheduler", last paragraphs.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from operator import attrgetter
 
 from backbone.scheduling.entries import INSTANT_S, SOON_S, ArcEntry
@@ -54,20 +54,21 @@ class Table:
 
     def in_order(self, arcs: Sequence[ArcEntry]) -> list[ArcEntry]:
         """Return ARCs of one group in the order of rule 2; ARCs with a reservation sort first."""
-        fairness, now_s = self.state.fairness, self.state.now_s
+        reserved, fairness, now_s = self._with_reservation(arcs), self.state.fairness, self.state.now_s
         seniority = {arc: fairness.seniority(arc, now_s) for arc in arcs}
         ordered = by_precedence(arcs, _PATH, seniority.__getitem__)
-        for reserved in [arc for arc in ordered if arc.reservation is not None]:
-            # A higher ARC that cannot run at all does not keep an ARC from the RCs freed for it.
-            if not any(self.usable(other) and other.goes_before(reserved) for other in arcs):
-                ordered.remove(reserved)
-                ordered.insert(0, reserved)
+        for arc in [arc for arc in ordered if arc in reserved] if reserved else ():
+            ordered.remove(arc)
+            ordered.insert(0, arc)
         return ordered
 
     def first_in_order(self, arcs: Sequence[ArcEntry]) -> ArcEntry:
         """Return the first of ARCs of one group, at least one, in the order of rule 2."""
-        if any(arc.reservation is not None for arc in arcs):
+        reserved = self._with_reservation(arcs)
+        if len(reserved) > 1:
             return self.in_order(arcs)[0]
+        if reserved:
+            return reserved[0]
         seniority, now_s = self.state.fairness.seniority, self.state.now_s
         eldest: dict[Level, tuple[Seniority, int, ArcEntry]] = {}
         for place, arc in enumerate(arcs):
@@ -78,6 +79,16 @@ class Table:
         return next(
             arc for arc in by_age if not any(other.level is not arc.level and rank_of(other, arc) > 0 for other in arcs)
         )
+
+    def _with_reservation(self, arcs: Sequence[ArcEntry]) -> list[ArcEntry]:
+        """Return those of these ARCs that sort first: RCs are freed for them, and no higher one may need these."""
+        return [
+            arc
+            for arc in arcs
+            if arc.reservation is not None
+            # A higher ARC that cannot run at all does not keep an ARC from the RCs freed for it.
+            and not any(other.goes_before(arc) and self.usable(other) for other in arcs)
+        ]
 
     # Blockers (rule 4).
 
@@ -102,13 +113,14 @@ class Table:
         """Return whether the RCs of the ARC should have been free by now."""
         return arc.state is RequestState.REVOKING and now_s > arc.since_s + arc.release_s
 
-    def holders(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return the other ARCs that hold an RC of the ARC."""
-        rcs, holders = self.state.rcs, dict[ArcEntry, None]()
+    def holders(self, arc: ArcEntry) -> Iterator[ArcEntry]:
+        """Yield the other ARCs that hold an RC of the ARC."""
+        rcs, known = self.state.rcs, {arc}
         for rc in arc.uses:
-            holders.update(rcs[rc].holders)
-        holders.pop(arc, None)
-        return [*holders]
+            for holder in rcs[rc].holders:
+                if holder not in known:
+                    known.add(holder)
+                    yield holder
 
     def could_start(self, arc: ArcEntry, holders: Iterable[ArcEntry], now_s: float) -> bool:
         """Return whether none of these holders blocks the ARC beyond now."""

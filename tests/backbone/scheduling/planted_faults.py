@@ -140,8 +140,8 @@ FAULTS = [
     Planted(
         "a reservation gives no precedence",
         "table.py",
-        "                ordered.insert(0, reserved)",
-        "                ordered.append(reserved)",
+        "            ordered.insert(0, arc)",
+        "            ordered.append(arc)",
     ),
     Planted(
         "strict looks at lower ARCs",
@@ -256,7 +256,7 @@ FAULTS = [
     Planted(
         "an ARC of a large group counts as blocked although its blocker has changed",
         "large_group.py",
-        "and known.version == state.rc_versions.get(known.rc, 0) + state.service_version",
+        "and known.version == versions.get(known.rc, 0) + service_version",
         "and True",
     ),
     Planted(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from random import Random
 from typing import Any
 
@@ -45,7 +45,7 @@ class ForgetfulPlanner(LargeGroupPlanner):
         super().__init__(table, slack_s=slack_s)
         self._firsts = Forgetful(table, slack_s=slack_s)
 
-    def _possible(self, now_s: float) -> dict[ArcEntry, list[ArcEntry]]:
+    def _possible(self, now_s: float) -> Iterator[ArcEntry]:
         self._blocked.clear()
         return super()._possible(now_s)
 
