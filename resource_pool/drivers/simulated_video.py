@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import functools
 import importlib
-import math
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -29,12 +28,11 @@ from backbone.waiting import end_tasks
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.picture_pace import PicturePace
+from resource_pool.drivers.picture_turns import PictureTurns
 from resource_pool.drivers.shared_camera import SharedCamera
 from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.drivers.world_messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, forget, probe, probe_once
-
-EARLY_S = 1 / 120  # chosen: a quarter of a frame, so that rounded frame times skip no frame
 
 
 class GrabberOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,7 +62,7 @@ class SimulatedFramegrabber:
         self._drawing: Future[tuple[Picture, float]] | None = None
         self._is_new = False
         self._taking: set[asyncio.Task[None]] = set()
-        self._next_s = -math.inf
+        self._turns = PictureTurns()
         self._pace = PicturePace(site.parameters.frame_rate_hz)
         self._delay_s = site.options(GrabberOptions).capture_delay_s
 
@@ -101,7 +99,8 @@ class SimulatedFramegrabber:
 
     def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
         """Receive this frequency from now on; see ``FramegrabberDriver.tune``."""
-        self._frequency, self._deliver, self._next_s, self._is_new = frequency, deliver, -math.inf, True
+        self._frequency, self._deliver, self._is_new = frequency, deliver, True
+        self._turns.begin()
 
     def stop(self) -> None:
         """Stop the delivery of pictures; see ``FramegrabberDriver.stop``."""
@@ -120,11 +119,8 @@ class SimulatedFramegrabber:
     def _world_moved(self, envelope: Envelope[WorldState]) -> None:
         state = envelope.body
         is_drawing = self._drawing is not None and not self._drawing.done()
-        if self._deliver is None or is_drawing or state.at_s < self._next_s - EARLY_S:
+        if self._deliver is None or is_drawing or not self._turns.take(state.at_s, self._pace.allowed_hz):
             return
-        pause_s = 1.0 / self._pace.allowed_hz
-        in_time = state.at_s < self._next_s + pause_s
-        self._next_s = (self._next_s if in_time else state.at_s) + pause_s
         tuned = _Tuned(self._frequency, self._deliver, self._is_new)
         self._is_new = False
         self._drawing = self._draw(state, tuned)
