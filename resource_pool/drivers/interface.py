@@ -45,6 +45,13 @@ class HardwareFault(Refusal):
     remedy = "Check cable, power and driver of the resource."
 
 
+class FixedOption(Refusal):
+    """A device that is open cannot change this option; nothing is changed."""
+
+    code = "driver.fixed_option"
+    remedy = "Change it in the mission file; the driver uses it from its next start on."
+
+
 @dataclass(frozen=True)
 class DriverSite:
     """A driver's interface to its RC.
@@ -239,7 +246,10 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
     "radio": {"simulated": "resource_pool.drivers.simulated:SimulatedRadio"},
     "robot": {"simulated": "resource_pool.drivers.simulated:SimulatedScoutProtocol"},
     "video_frequency": {"simulated": "resource_pool.drivers.interface:NoDevice"},
-    "framegrabber": {"simulated": "resource_pool.drivers.simulated_video:SimulatedFramegrabber"},
+    "framegrabber": {
+        "simulated": "resource_pool.drivers.simulated_video:SimulatedFramegrabber",
+        "recorded": "resource_pool.drivers.recorded:RecordedCamera",
+    },
 }
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from backbone.mission.class_facts import ParameterFacts, shipped_classes
+from backbone.mission.class_facts import ClassFacts, ParameterFacts, shipped_classes
 from backbone.mission.declaration.vocabulary import MANY, AttributeRule, ElementRule, vocabulary
 from backbone.mission.parameter_checks import SERVICE_PARAMETERS
 from backbone.mission.shipped_types import shipped_types
@@ -17,6 +17,7 @@ _ELEMENTS = "## Elements\n"
 _ATTRIBUTES = "| attribute | default | meaning |"
 _RULES = "| parameter of the `rc_manager` | default | meaning |"
 _PARAMETERS = "| type of resource | parameter | default | meaning |"
+_OPTIONS = "| type of resource | driver | option | default | meaning |"
 
 
 def reference_text(page: str) -> str:
@@ -48,17 +49,30 @@ def _notes(before: str) -> Iterator[str]:
             yield _table(_RULES, (_parameter_row(one) for one in SERVICE_PARAMETERS["rc_manager"]))
         elif begin == _PARAMETERS:
             yield _table(_PARAMETERS, _resource_parameters())
+        elif begin == _OPTIONS:
+            yield _table(_OPTIONS, _driver_options())
         else:
             yield paragraph
 
 
 def _resource_parameters() -> Iterator[str]:
+    for kind, facts in _resource_types():
+        for one in facts.parameters_with(SIMULATED) or ():
+            if one.name != WORLD:
+                yield f"| `{kind}` {_parameter_row(one)}"
+
+
+def _driver_options() -> Iterator[str]:
+    for kind, facts in _resource_types():
+        for driver, options in (facts.options or {}).items():
+            if driver != SIMULATED:
+                yield from (f"| `{kind}` | `{driver}` {_parameter_row(one)}" for one in options)
+
+
+def _resource_types() -> Iterator[tuple[str, ClassFacts]]:
     for kind in shipped_types():
-        facts = shipped_classes()[kind.text("class")]
         if kind.text("subsystem") == "resource_pool" and not kind.children and kind.text("name") != SIMULATED_WORLD:
-            for one in facts.parameters_with(SIMULATED) or ():
-                if one.name != WORLD:
-                    yield f"| `{kind.text('name')}` {_parameter_row(one)}"
+            yield kind.text("name"), shipped_classes()[kind.text("class")]
 
 
 def _parameter_row(one: ParameterFacts) -> str:

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-HEAVY = ("numpy", "cv2", "mujoco", "mink", "pydantic", "lxml", "rich", "typer", "textual")
+HEAVY = ("numpy", "cv2", "mujoco", "mink", "pydantic", "lxml", "mcap", "rich", "typer", "textual")
 LIGHT = [
     "resource_pool.rcs.scout",
     "resource_pool.rcs.command_radio",
@@ -15,6 +15,7 @@ LIGHT = [
     "resource_pool.rcs.framegrabber",
     "resource_pool.rcs.skeleton",
     "resource_pool.drivers.simulated",
+    "resource_pool.drivers.recorded",
     "resource_pool.arcs.capture",
     "resource_pool.robots.rover.arcs",
     "resource_pool.devices.monitor.rc",
