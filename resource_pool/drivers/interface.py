@@ -248,6 +248,7 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
     "video_frequency": {"simulated": "resource_pool.drivers.interface:NoDevice"},
     "framegrabber": {
         "simulated": "resource_pool.drivers.simulated_video:SimulatedFramegrabber",
+        "video_device": "resource_pool.drivers.video_device:VideoDevice",
         "recorded": "resource_pool.drivers.recorded:RecordedCamera",
     },
 }

@@ -48,6 +48,10 @@ class Capture:
         height_px, width_px = taken.shape[:2]
         return Picture(captured_s, np.ascontiguousarray(taken).reshape(-1).data, width_px, height_px)
 
+    def size_px(self) -> tuple[int, int]:
+        """Return columns and rows."""
+        return round(self.number(cv2.CAP_PROP_FRAME_WIDTH)), round(self.number(cv2.CAP_PROP_FRAME_HEIGHT))
+
     def number(self, of: int) -> float:
         """Return a property of OpenCV's ``CAP_PROP_…``; 0: unknown."""
         return float(self._capture.get(of))

@@ -86,6 +86,7 @@ class RecordedCamera:
         if (options.file, options.key) != (self._options.file, self._options.key):
             raise FixedOption(f"{site.resource} cannot play another file while it runs")
         self._options, self._asked_hz = options, site.parameters.frame_rate_hz
+        self._turns.begin()
         self._remark_rate()
 
     def allowed_hz(self) -> float:
