@@ -243,7 +243,10 @@ class ScoutProtocol(RobotProtocol, Protocol):
 
 
 BUILT_IN: Mapping[str, Mapping[str, str]] = {
-    "radio": {"simulated": "resource_pool.drivers.simulated:SimulatedRadio"},
+    "radio": {
+        "simulated": "resource_pool.drivers.simulated:SimulatedRadio",
+        "serial_radio": "resource_pool.drivers.serial_radio:SerialRadio",
+    },
     "robot": {"simulated": "resource_pool.drivers.simulated:SimulatedScoutProtocol"},
     "video_frequency": {"simulated": "resource_pool.drivers.interface:NoDevice"},
     "framegrabber": {

@@ -17,6 +17,7 @@ LIGHT = [
     "resource_pool.drivers.simulated",
     "resource_pool.drivers.recorded",
     "resource_pool.drivers.video_device",
+    "resource_pool.drivers.serial_radio",
     "resource_pool.arcs.capture",
     "resource_pool.robots.rover.arcs",
     "resource_pool.devices.monitor.rc",

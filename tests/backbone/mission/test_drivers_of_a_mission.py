@@ -141,6 +141,42 @@ def test_options_of_a_driver_of_ones_own_are_checked(own: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("driver", "options", "fault"),
+    [
+        ("serial_radio", [("port", "/dev/ttyUSB0"), ("baud", "57600"), ("extra_s", "0.01")], ""),
+        ("serial_radio", [], "radio lacks parameter port"),
+        ("serial_radio", [("port", "/dev/ttyUSB0"), ("baud", "12345")], "baud='12345' is illegal"),
+        ("serial_radio", [("port", "/dev/ttyUSB0"), ("bits_per_s", "9600")], "has no parameter 'bits_per_s'"),
+        ("video_device", [], ""),
+        ("video_device", [("device", "0"), ("width_px", "640")], ""),
+        ("video_device", [("device", "/dev/video2")], ""),
+        ("video_device", [("device", "-1")], "device='-1' is illegal"),
+        ("video_device", [("height_px", "9000")], "height_px='9000' is illegal"),
+        ("video_device", [("capture_delay_s", "0.1")], "has no parameter 'capture_delay_s'"),
+        ("recorded", [("file", "corridor.mp4"), ("loop", "true")], ""),
+        ("recorded", [("loop", "true")], "grabber lacks parameter file"),
+        ("recorded", [("file", "corridor.mp4"), ("loop", "twice")], "loop='twice' is illegal"),
+    ],
+    ids=str,
+)
+def test_options_of_the_drivers_of_real_devices_are_checked(
+    tmp_path: Path, driver: str, options: list[tuple[str, str]], fault: str
+) -> None:
+    given = "".join(f'\n<parameter name="{name}" value="{value}"/>' for name, value in options)
+    if driver == "serial_radio":
+        text = changed((f"{RADIO}/>", f'{RADIO} driver="{driver}">{given}</resource>'))
+    else:
+        text = changed((f"{GRABBER}>", f'{GRABBER} driver="{driver}">{given}'))
+    if not fault:
+        assert read_text(tmp_path, text).resources
+        return
+    [found] = faults_in(tmp_path, text)
+    assert fault in found.message
+    wrong = f"{options[-1][0]}" if "lacks" not in fault else f'driver="{driver}"'
+    assert wrong in text.splitlines()[found.line - 1]
+
+
 def test_drivers_on_other_machines_are_not_looked_for_here(own: Path) -> None:
     elsewhere = ('address="127.0.0.1"', 'address="192.0.2.1"')
     read_text(own, changed(elsewhere, (RADIO, f'{RADIO} driver="not_here.at_all:Radio"')))
