@@ -12,6 +12,7 @@ import msgspec
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Element, Path
+from backbone.mission.tables import SIMULATED
 from ui_console.design.catalogue import Role, entries
 from ui_console.design.commands import DesignCommand
 from ui_console.design.effects import rename, set_value, write_parameter
@@ -68,7 +69,7 @@ def properties(mission: Element, node: Element, facts: Mapping[str, ClassFacts])
             one.default,
             one.required and name not in node.values,
             is_parameter=False,
-            doc=one.documentation,
+            doc=" ".join([one.documentation, *_built_in(mission, node, name, facts)]),
             choices=choices(mission, node, name, one.words),
         )
         for name, one in rule.attributes.items()
@@ -107,9 +108,18 @@ def class_of(mission: Element, node: Element) -> str:
     return next((one.class_path for one in entries(mission) if one.name == node.text("type")), "")
 
 
+def _built_in(mission: Element, node: Element, attribute: str, facts: Mapping[str, ClassFacts]) -> list[str]:
+    """Return the names of the built-in drivers, which is no choice, because a class may be written as well."""
+    known = facts.get(class_of(mission, node), ClassFacts())
+    is_driver = node.tag == "resource" and attribute == known.driver_field == "driver"
+    return [f"Built in: {', '.join(known.options)}."] if is_driver and known.options else []
+
+
 def _parameters(mission: Element, node: Element, facts: Mapping[str, ClassFacts]) -> list[Property]:
     given = {one.text("name"): one.text("value") for one in node.all("parameter")}
-    known = facts.get(class_of(mission, node), ClassFacts()).parameters
+    of_class = facts.get(class_of(mission, node), ClassFacts())
+    driver = given.get(of_class.driver_field) or node.values.get("driver", SIMULATED)
+    known = of_class.parameters_with(driver) or of_class.parameters
     found = [
         Property(
             one.name,

@@ -14,7 +14,7 @@ from shipped_drafts import EVERYTHING_DECLARED, ROOT, SHIPPED
 
 from backbone.errors import Refusal
 from backbone.mission.behavior_orders import TREE_PARAMETERS
-from backbone.mission.class_facts import ClassFacts, ParameterFacts
+from backbone.mission.class_facts import ClassFacts, ParameterFacts, shipped_classes
 from backbone.mission.edit import Element, NewElement, outline
 from backbone.mission.reader import MissionInvalid, read_mission
 from ui_console.design.catalogue import Role, entries, stock
@@ -35,7 +35,7 @@ from ui_console.design.effects import (
 )
 from ui_console.design.file import save
 from ui_console.design.offers import free_name, offers
-from ui_console.design.properties import properties
+from ui_console.design.properties import Property, properties
 from ui_console.design.views import problems_view, tree_view
 
 COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
@@ -354,6 +354,21 @@ def test_properties_know_meaning_default_and_what_may_be_chosen() -> None:
     assert (radio["connect-s"].value, radio["connect-s"].default) == (None, "0")
     assert radio["sharable"].choices == ("true", "false")
     assert radio["host"].choices == ("base",)
+
+
+def test_properties_of_a_resource_are_those_of_its_driver_too() -> None:
+    draft = watchers()
+
+    def of_grabber(draft: Draft) -> dict[str, Property]:
+        grabber = only(draft, "resource", "grabber")
+        return {one.name: one for one in properties(draft.mission, grabber, shipped_classes())}
+
+    assert of_grabber(draft)["driver"].doc.endswith("Built in: simulated, video_device, recorded.")
+    assert of_grabber(draft)["capture_delay_s"].doc.startswith("Time from a frame to its delivery")
+    played = draft.do(set_value(only(draft, "resource", "grabber").path, "driver", "recorded"))
+    assert "capture_delay_s" not in of_grabber(played)
+    assert of_grabber(played)["file"].is_missing
+    assert of_grabber(played)["loop"].choices == ("true", "false")
 
 
 def test_parameters_of_shipped_classes_are_judged_and_of_others_once_they_were_looked_up() -> None:
