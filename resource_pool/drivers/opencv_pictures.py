@@ -61,47 +61,48 @@ class Capture:
         self._capture.release()
 
 
-def open_camera(device: str | int, width_px: int, height_px: int) -> Capture:
+def open_camera(device: str | int, name: str, width_px: int, height_px: int) -> Capture:
     """Return the open camera.
 
     Args:
         device: Its path or number on this host, or its address in the network.
+        name: Its name for people.
         width_px: Wished columns; 0: as it likes.
         height_px: Wished rows; 0: as it likes.
 
     Raises:
         HardwareFault: It is missing, in use, or no camera.
     """
+    remedy = "Plug it in, and end the program that uses it: fuser /dev/video* names it."
     if isinstance(device, int):
-        return _opened(cv2.VideoCapture(device), f"video device {device}", width_px, height_px)
-    if "://" in device:
+        capture = cv2.VideoCapture(device)
+    elif "://" in device:
+        remedy = "Open the address with another program on this host, for example a browser or ffplay."
         limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, NETWORK_OPENS_WITHIN_MS]
         limits += [cv2.CAP_PROP_READ_TIMEOUT_MSEC, NETWORK_READS_WITHIN_MS]
-        remedy = "Open the address with another program on this host, for example a browser or ffplay."
-        return _opened(cv2.VideoCapture(device, cv2.CAP_FFMPEG, limits), device, width_px, height_px, remedy)
-    if not Path(device).exists():
+        capture = cv2.VideoCapture(device, cv2.CAP_FFMPEG, limits)
+    else:
+        _check_path(Path(device))
+        capture = cv2.VideoCapture(device, cv2.CAP_V4L2)
+    if not capture.isOpened():
+        raise HardwareFault(f"{name} cannot be opened: it is missing, in use, or no camera", remedy=remedy)
+    for wished_px, of in ((width_px, cv2.CAP_PROP_FRAME_WIDTH), (height_px, cv2.CAP_PROP_FRAME_HEIGHT)):
+        if wished_px:
+            capture.set(of, wished_px)
+    return Capture(capture, name)
+
+
+def _check_path(device: Path) -> None:
+    if not device.exists():
         raise HardwareFault(
             f"there is no video device {device}", remedy="Plug it in; v4l2-ctl --list-devices lists all."
         )
-    if Path(device).is_file():
+    if device.is_file():
         raise HardwareFault(f"{device} is a file, no video device", remedy='A file is played by driver="recorded".')
     if not os.access(device, os.R_OK | os.W_OK):
         raise HardwareFault(
             f"this user may not open {device}", remedy="Add the user to the group of the device: video."
         )
-    return _opened(cv2.VideoCapture(device, cv2.CAP_V4L2), device, width_px, height_px)
-
-
-def _opened(capture: cv2.VideoCapture, name: str, width_px: int, height_px: int, remedy: str | None = None) -> Capture:
-    if not capture.isOpened():
-        raise HardwareFault(
-            f"{name} cannot be opened: it is missing, in use, or no camera",
-            remedy=remedy or "Plug it in, and end the program that uses it: fuser /dev/video* names it.",
-        )
-    for wished_px, of in ((width_px, cv2.CAP_PROP_FRAME_WIDTH), (height_px, cv2.CAP_PROP_FRAME_HEIGHT)):
-        if wished_px:
-            capture.set(of, wished_px)
-    return Capture(capture, name)
 
 
 class VideoFilm:

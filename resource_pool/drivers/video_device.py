@@ -16,6 +16,7 @@ import dataclasses
 import importlib
 import logging
 import math
+import re
 import threading
 import time
 from collections import deque
@@ -89,8 +90,7 @@ class VideoDevice:
     def __init__(self, site: DriverSite) -> None:
         self._site = site
         self._options = site.options(VideoDeviceOptions)
-        device = self._options.device
-        self._name = f"video device {device}" if isinstance(device, int) else device
+        self._name = _named(self._options.device)
         self._asked_hz: float = site.parameters.frame_rate_hz
         self._delivers_hz = math.inf  # until it is measured
         self._deliver: Deliver | None = None
@@ -156,7 +156,7 @@ class VideoDevice:
         options = self._options
         try:
             pictures: Any = importlib.import_module("resource_pool.drivers.opencv_pictures")
-            capture = pictures.open_camera(options.device, options.width_px, options.height_px)
+            capture = pictures.open_camera(options.device, self._name, options.width_px, options.height_px)
             try:
                 reading.alive_s = time.monotonic()
                 reading.call(settle, reading.opened, capture.size_px())
@@ -223,3 +223,8 @@ class VideoDevice:
         if remark != self._remark:
             self._remark = remark
             self._site.remark(remark)
+
+
+def _named(device: str | int) -> str:
+    """Return the name of a device for people and logs: the address of a camera without user and password."""
+    return f"video device {device}" if isinstance(device, int) else re.sub(r"//[^/]*@", "//", device)

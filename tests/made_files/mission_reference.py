@@ -77,7 +77,7 @@ def _resource_types() -> Iterator[tuple[str, ClassFacts]]:
 
 def _parameter_row(one: ParameterFacts) -> str:
     default = one.schema.get("default")
-    shown = f"{default:g}" if isinstance(default, float) else str(default)
+    shown = f"{default:g}" if isinstance(default, float) else one.default.strip('"')
     return f"| `{one.name}` | {'required' if one.is_required else f'`{shown}`' if shown else '–'} | {one.meaning} |"
 
 

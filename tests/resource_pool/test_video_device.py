@@ -170,8 +170,8 @@ async def test_it_may_be_closed_and_opened_again_and_closed_twice() -> None:
         ("missing", "there is no video device "),
         ("video.avi", " is a file, no video device"),
         ("folder", " cannot be opened: it is missing, in use, or no camera"),
+        ("http://ann:secret@127.0.0.1:9/video.mjpg", r"^http://127\.0\.0\.1:9/video\.mjpg cannot be opened: "),
         (99, "video device 99 cannot be opened: it is missing, in use, or no camera"),
-        ("http://127.0.0.1:9/video.mjpg", " cannot be opened: it is missing, in use, or no camera"),
     ],
 )
 async def test_a_device_that_cannot_be_opened_is_a_hardware_fault(
