@@ -88,3 +88,24 @@ async def test_a_mission_plays_footage_as_the_guide_shows_it(tmp_path: Path) -> 
 
 def test_the_guide_shows_the_webcam_of_the_example() -> None:
     assert resource_in(GUIDE.read_text()) == resource_in(WEBCAM.read_text())
+
+
+@pytest.mark.thorough
+async def test_a_mission_that_is_up_exchanges_its_camera_as_the_guide_shows_it(tmp_path: Path) -> None:
+    footage = video(tmp_path / "corridor.avi", 6, rate_hz=10.0)
+    words = GUIDE.read_text().partition("scout-backbone swap ")[2].partition("\n")[0].split()
+    assert words[:2] == ["grabber", "recorded"]
+    words = [word.replace("corridor.mp4", str(footage)) for word in words]
+    with network_camera() as camera:
+        address = f'<parameter name="device" value="{camera.address}"/>'
+        with mission_up(mission_xml=WEBCAM, change={DEVICE: address}) as mission:
+            async with mission.bus() as bus:
+                frames = frames_of(bus)
+                await seen(mission, frames, 3)
+                swapped = ("scout-backbone", "swap", *words, "--mission", mission.name)
+                done = await asyncio.to_thread(mission.command, *swapped)
+                assert done.returncode == 0, f"{done.stdout}\n{done.stderr}\n{mission.story()}"
+                camera.unplugged.set()
+                while not frames.empty():
+                    frames.get_nowait()
+                assert kinds(await seen(mission, frames, 14)) == {*range(6)}
