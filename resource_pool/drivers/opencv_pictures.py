@@ -86,10 +86,12 @@ def open_camera(device: str | int, name: str, width_px: int, height_px: int) -> 
         capture = cv2.VideoCapture(device, cv2.CAP_V4L2)
     if not capture.isOpened():
         raise HardwareFault(f"{name} cannot be opened: it is missing, in use, or no camera", remedy=remedy)
-    for wished_px, of in ((width_px, cv2.CAP_PROP_FRAME_WIDTH), (height_px, cv2.CAP_PROP_FRAME_HEIGHT)):
-        if wished_px:
-            capture.set(of, wished_px)
-    return Capture(capture, name)
+    opened = Capture(capture, name)
+    if width_px or height_px:
+        has_px = opened.size_px()
+        capture.set(cv2.CAP_PROP_FRAME_WIDTH, width_px or has_px[0])
+        capture.set(cv2.CAP_PROP_FRAME_HEIGHT, height_px or has_px[1])  # V4L2 sets a size once it has both
+    return opened
 
 
 def _check_path(device: Path) -> None:

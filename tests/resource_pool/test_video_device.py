@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from network_camera import network_camera
@@ -345,6 +346,21 @@ def test_a_device_without_a_tuner_is_linked_to_one_frequency() -> None:
 
 async def _made(**given: Any) -> Bench:
     return Bench(**given)
+
+
+@pytest.mark.parametrize(
+    ("wished", "sized"), [((0, 0), []), ((320, 0), [320, 480]), ((0, 240), [640, 240]), ((320, 240), [320, 240])]
+)
+def test_a_camera_gets_a_whole_size_even_if_half_of_it_is_wished(
+    monkeypatch: pytest.MonkeyPatch, wished: tuple[int, int], sized: list[int]
+) -> None:
+    """OpenCV passes a size to V4L2 only when it has both sides."""
+    has = {cv2.CAP_PROP_FRAME_WIDTH: 640, cv2.CAP_PROP_FRAME_HEIGHT: 480}
+    got: list[int] = []
+    opened = SimpleNamespace(isOpened=lambda: True, get=has.get, set=lambda _of, value: got.append(value))
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_asked: opened)
+    opencv_pictures.open_camera(0, "camera", *wished)
+    assert got == sized
 
 
 @pytest.mark.parametrize(
