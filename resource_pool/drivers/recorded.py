@@ -97,7 +97,8 @@ class RecordedCamera:
         """Open the file, and begin to play."""
         self._film = await self._in_thread(self._opened)
         self._remark_rate()
-        self._playing = asyncio.create_task(self._play(self._film), name=f"{self._site.resource}: play")
+        playing = self._play(self._film, self._site.clock.now_s())
+        self._playing = asyncio.create_task(playing, name=f"{self._site.resource}: play")
         self._playing.add_done_callback(self._played)
 
     def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:  # noqa: ARG002  it plays on each
@@ -135,8 +136,7 @@ class RecordedCamera:
         video: Film = importlib.import_module("resource_pool.drivers.opencv_pictures").VideoFilm(name)
         return video
 
-    async def _play(self, film: Film) -> None:
-        begin_s = self._site.clock.now_s()
+    async def _play(self, film: Film, begin_s: float) -> None:
         while True:
             begin_s = await self._play_once(film, begin_s) + 1.0 / film.hz
             if not self._options.loop:

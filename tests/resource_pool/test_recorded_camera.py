@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from small_recordings import Said, recorded
@@ -17,6 +20,7 @@ from backbone.bus.clock import MissionClock, VirtualClock, run_virtual
 from backbone.component.messages import WrongParameter
 from backbone.keys import Conversation
 from resource_pool.drivers.interface import DriverSite, FixedOption, HardwareFault, Picture
+from resource_pool.drivers.opencv_pictures import VideoFilm
 from resource_pool.drivers.recorded import RecordedCamera
 from resource_pool.messages import Frame
 
@@ -40,6 +44,12 @@ class Stage:
     def deliver(self, picture: Picture) -> None:
         self.pictures.append(picture)
         self.seen.append((round(picture.captured_s, 6), number_of(picture.pixels)))
+
+    async def arrived(self, pictures: int) -> None:
+        """Return when so many pictures were delivered."""
+        async with asyncio.timeout(10.0):
+            while len(self.seen) < pictures:
+                await self.clock.sleep_s(0.01)
 
     def _fail(self, bug: BaseException) -> None:
         self.bugs.append(bug)
@@ -124,18 +134,61 @@ def test_a_driver_that_is_opened_again_plays_from_the_begin(footage: str) -> Non
     assert run_virtual(play()) == [(0.0, 0), (0.1, 1), (0.2, 2), (0.25, 0), (0.35, 1), (0.45, 2)]
 
 
-async def test_on_a_machines_clock_an_event_loop_that_was_late_gets_only_new_pictures(footage: str) -> None:
+def stand_still(clock: MissionClock, until_s: float) -> None:
+    """Let no other callback of the event loop run until this time."""
+    while clock.now_s() < until_s:
+        time.sleep(0.001)
+
+
+async def test_an_event_loop_that_was_late_gets_only_pictures_of_now(footage: str) -> None:
     stage = Stage(MissionClock.started_now(), file=footage, loop=True)
     await stage.driver.open()
-    stage.driver.tune("video1", stage.deliver)
     began_s = stage.clock.now_s()
-    while stage.clock.now_s() < began_s + 0.55:
-        pass
-    while len(stage.seen) < 3:
-        await stage.clock.sleep_s(0.01)
+    stage.driver.tune("video1", stage.deliver)
+    stand_still(stage.clock, began_s + 0.55)
+    await stage.arrived(3)
     await stage.driver.close()
-    late = [at_s for at_s, _number in stage.seen if began_s + 0.1 < at_s < began_s + 0.35]
-    assert not late, f"{stage.seen} since {began_s}"
+    assert stage.seen[0][0] > began_s + 0.35, f"{stage.seen} since {began_s}"
+
+
+async def test_a_late_event_loop_gets_no_picture_from_before_the_tuning(footage: str) -> None:
+    stage = Stage(MissionClock.started_now(), file=footage, loop=True)
+    await stage.driver.open()
+    began_s = stage.clock.now_s()
+    stand_still(stage.clock, began_s + 0.25)
+    stage.driver.tune("video1", stage.deliver)
+    tuned_s = stage.clock.now_s()
+    await stage.arrived(2)
+    await stage.driver.close()
+    assert stage.seen[0][0] >= round(tuned_s, 6) - 1e-6
+
+
+async def test_a_picture_that_is_being_decoded_at_the_stop_is_not_delivered(
+    footage: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, may_go_on, decode = threading.Event(), threading.Event(), VideoFilm.picture
+
+    def slowly(film: VideoFilm, captured_s: float) -> Picture | None:
+        begun.set()
+        may_go_on.wait(5.0)
+        return decode(film, captured_s)
+
+    monkeypatch.setattr(VideoFilm, "picture", slowly)
+    stage = Stage(MissionClock.started_now(), file=footage)
+    await stage.driver.open()
+    stage.driver.tune("video1", stage.deliver)
+    await asyncio.to_thread(begun.wait, 5.0)
+    stage.driver.stop()
+    may_go_on.set()
+    await stage.clock.sleep_s(0.3)
+    assert stage.seen == []
+    await stage.driver.close()
+
+
+def test_a_damaged_picture_is_left_out(footage: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    decode = VideoFilm.picture
+    monkeypatch.setattr(VideoFilm, "picture", lambda film, at_s: None if 0.15 < at_s < 0.25 else decode(film, at_s))
+    assert [number for _at_s, number in played(file=footage).seen] == [0, 1, 3, 4, 5]
 
 
 def frames(pictures: int, key: str = "watch-capture") -> Iterator[Said]:
@@ -154,6 +207,13 @@ def test_a_camera_of_a_recording_is_played_at_the_times_of_its_captures(tmp_path
     assert stage.seen == [(0.0, 0), (0.1, 1), (0.2, 2), (0.8, 3), (0.9, 4)]
     assert stage.remarks[-1] == f"{night} has ended, and is not repeated"
     assert played(file=str(night), loop=True, until_s=2.5).seen[:5] == stage.seen
+
+
+def test_a_picture_that_is_not_newer_than_the_last_one_is_left_out(tmp_path: Path) -> None:
+    night, [first, second, third] = tmp_path / "night.mcap", frames(3)
+    late = third._replace(body=msgspec.structs.replace(third.body, captured_s=second.body.captured_s - 0.05))
+    night.write_bytes(recorded([first, second, late, *list(frames(5))[3:]]).getvalue())
+    assert [number for _at_s, number in played(file=str(night)).seen] == [0, 1, 3, 4]
 
 
 def test_of_several_cameras_one_must_be_named(tmp_path: Path) -> None:
@@ -207,7 +267,7 @@ def test_a_file_that_ends_while_it_is_repeated_is_reported(tmp_path: Path) -> No
 
 def test_rate_and_repetition_may_change_while_it_plays_and_the_file_may_not(footage: str) -> None:
     async def play() -> list[tuple[float, int]]:
-        stage = Stage(VirtualClock(), file=footage)
+        stage = Stage(VirtualClock(), 0.1, file=footage)
         await stage.driver.open()
         stage.driver.tune("video1", stage.deliver)
         await stage.clock.sleep_until_s(0.05)

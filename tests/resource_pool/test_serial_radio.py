@@ -110,6 +110,21 @@ def test_a_call_that_is_cut_off_takes_back_what_has_not_left(line: SerialLine) -
     run_virtual(scene())
 
 
+def test_a_call_that_is_cut_off_ends_when_the_adapter_has_sent_what_it_had(line: SerialLine) -> None:
+    async def scene() -> None:
+        desk = Desk(VirtualClock(), port=line.port, baud=9600)
+        await desk.radio.open()
+        call = asyncio.ensure_future(desk.send(b"D12345678"))
+        await asyncio.sleep(0.001)
+        call.cancel()
+        await asyncio.wait({call})
+        assert call.cancelled()
+        assert 10 * 16 / 9600 <= desk.clock.now_s() <= 10 * 16 / 9600 + 0.003
+        await desk.radio.close()
+
+    run_virtual(scene())
+
+
 def test_a_line_that_takes_no_bytes_is_a_hardware_fault(line: SerialLine) -> None:
     async def scene() -> None:
         desk = Desk(VirtualClock(), port=line.port, baud=1000000)

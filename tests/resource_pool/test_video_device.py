@@ -240,8 +240,21 @@ async def test_a_late_event_loop_gets_the_newest_picture_alone(capture: FakeCapt
     await close(bench, capture)
 
 
-async def test_a_damaged_picture_is_left_out(capture: FakeCapture) -> None:
+async def test_a_picture_that_waits_for_the_event_loop_at_the_stop_is_not_delivered(capture: FakeCapture) -> None:
     bench = Bench(rate_hz=1000.0)
+    await bench.open(capture)
+    bench.tune()
+    show_in_turn(capture, 0)
+    show_in_turn(capture, 1)
+    bench.driver.stop()
+    await asyncio.sleep(0.02)
+    assert bench.pictures.empty()
+    await close(bench, capture)
+
+
+async def test_a_damaged_picture_is_left_out(capture: FakeCapture) -> None:
+    bench, bugs = Bench(rate_hz=1000.0), list[object]()
+    asyncio.get_running_loop().set_exception_handler(lambda _loop, bug: bugs.append(bug))
     await bench.open(capture)
     bench.tune()
     for level in (0, -1, 7):
@@ -249,6 +262,7 @@ async def test_a_damaged_picture_is_left_out(capture: FakeCapture) -> None:
         await asyncio.sleep(0.02)
     assert (await bench.next()).pixels[0] == 7
     await close(bench, capture)
+    assert not bugs
 
 
 async def test_a_device_that_is_silent_is_a_hardware_fault_and_holds_up_nothing(
