@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 from pathlib import Path
 
 from backbone.errors import Refusal
@@ -40,7 +39,7 @@ class RecordingFilm:
             raise HardwareFault(refusal.detail, remedy=refusal.remedy) from refusal
         self._messages = self._recording.messages(self._keys)
         self._taken: Recorded | None = None
-        self._first_s = self._last_s = -math.inf
+        self._first_s = 0.0
 
     def advance(self) -> float | None:
         """Take the next picture; see ``recorded.Film``."""
@@ -48,10 +47,9 @@ class RecordingFilm:
             body = message.body
             if message.schema.startswith(FRAMES) and isinstance(body, dict) and body.keys() >= PARTS:
                 at_s = float(body["captured_s"])
-                if at_s > self._last_s:
-                    self._first_s = at_s if self._taken is None else self._first_s
-                    self._taken, self._last_s = message, at_s
-                    return at_s - self._first_s
+                self._first_s = at_s if self._taken is None else self._first_s
+                self._taken = message
+                return at_s - self._first_s
         return None
 
     def picture(self, captured_s: float) -> Picture | None:
@@ -65,7 +63,6 @@ class RecordingFilm:
     def rewind(self) -> None:
         """Begin again."""
         self._messages, self._taken = self._recording.messages(self._keys), None
-        self._first_s = self._last_s = -math.inf
 
     def close(self) -> None:
         """Close the file."""
