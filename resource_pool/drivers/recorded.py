@@ -81,13 +81,13 @@ class RecordedCamera:
         self._playing: asyncio.Task[None] | None = None
 
     def adjust(self, site: DriverSite) -> None:
-        """Apply the new rate, and whether the file is repeated, from the next picture on."""
-        options = site.options(RecordedOptions)
-        if (options.file, options.key) != (self._options.file, self._options.key):
-            raise FixedOption(f"{site.resource} cannot play another file while it runs")
-        self._options, self._asked_hz = options, site.parameters.frame_rate_hz
+        """Apply the new rate from the next picture on."""
+        if site.options(RecordedOptions) != self._options:
+            raise FixedOption(f"{site.resource} cannot change what it plays while it runs")
+        self._asked_hz = site.parameters.frame_rate_hz
         self._turns.begin()
-        self._remark_rate()
+        if self._playing is not None and not self._playing.done():
+            self._remark_rate()
 
     def allowed_hz(self) -> float:
         """Return the rate of the file if it is lower than the requested one; see ``YieldingDriver``."""
