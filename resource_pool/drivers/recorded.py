@@ -19,6 +19,7 @@ import msgspec
 
 from backbone.waiting import bug_of, end_tasks
 from resource_pool.drivers.interface import DriverSite, FixedOption, HardwareFault, Picture
+from resource_pool.drivers.picture_pace import PicturePace
 from resource_pool.drivers.picture_turns import PictureTurns
 
 RECORDING = ".mcap"
@@ -72,7 +73,7 @@ class RecordedCamera:
     def __init__(self, site: DriverSite) -> None:
         self._site = site
         self._options = site.options(RecordedOptions)
-        self._asked_hz: float = site.parameters.frame_rate_hz
+        self._pace = PicturePace(site.parameters.frame_rate_hz)
         self._turns = PictureTurns()
         self._deliver: Callable[[Picture], None] | None = None
         self._tuned_s = 0.0
@@ -84,14 +85,14 @@ class RecordedCamera:
         """Apply the new rate from the next picture on."""
         if site.options(RecordedOptions) != self._options:
             raise FixedOption(f"{site.resource} cannot change what it plays while it runs")
-        self._asked_hz = site.parameters.frame_rate_hz
+        self._pace.ask(site.parameters.frame_rate_hz)
         self._turns.begin()
         if self._playing is not None and not self._playing.done():
             self._remark_rate()
 
     def allowed_hz(self) -> float:
-        """Return the rate of the file if it is lower than the requested one; see ``YieldingDriver``."""
-        return self._asked_hz if self._film is None else min(self._asked_hz, self._film.hz)
+        """Return the rate of the file or of a busy host, if lower than the requested one; see ``YieldingDriver``."""
+        return self._pace.allowed_hz if self._film is None else min(self._pace.allowed_hz, self._film.hz)
 
     async def open(self) -> None:
         """Open the file, and begin to play."""
@@ -157,9 +158,13 @@ class RecordedCamera:
 
     async def _show(self, film: Film, captured_s: float) -> None:
         """Deliver the picture, unless the next one is due too, because the event loop was late."""
-        deliver, is_old = self._deliver, self._site.clock.now_s() >= captured_s + 1.0 / film.hz
-        if deliver is None or captured_s < self._tuned_s or is_old or not self._turns.take(captured_s, self._asked_hz):
+        deliver, clock = self._deliver, self._site.clock
+        is_old = clock.now_s() >= captured_s + 1.0 / film.hz
+        allowed_hz = self._pace.allowed_hz
+        if deliver is None or captured_s < self._tuned_s or is_old or not self._turns.take(captured_s, allowed_hz):
             return
+        if self._pace.delivered((clock.now_s() - captured_s) / clock.rate, clock.now_s() / clock.rate):
+            self._remark_rate()
         picture = await self._in_thread(lambda: film.picture(captured_s))
         if picture is not None and self._deliver is deliver:
             deliver(picture)
@@ -169,9 +174,10 @@ class RecordedCamera:
             self._site.fail(bug)
 
     def _remark_rate(self) -> None:
-        allowed_hz = self.allowed_hz()
-        few = f"{allowed_hz:.3g} of {self._asked_hz:.3g} pictures a second: {self._options.file} has no more"
-        self._site.remark(few if allowed_hz < self._asked_hz else "")
+        """Show the rate of a busy host, or else of the file, if it is lower than the requested one."""
+        allowed_hz, asked_hz = self.allowed_hz(), self._pace.asked_hz
+        few = f"{allowed_hz:.3g} of {asked_hz:.3g} pictures a second: {self._options.file} has no more"
+        self._site.remark(self._pace.remark() or (few if allowed_hz < asked_hz else ""))
 
     async def _in_thread(self, work: Callable[[], T]) -> T:
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)

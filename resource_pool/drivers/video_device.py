@@ -5,7 +5,7 @@ linked to one frequency, and tuning only begins the delivery.
 
 A thread of its own opens, reads and closes the device, because each of these can take seconds. It takes every picture,
 so that none waits in the device, and decodes those that are delivered. If the event loop is late, only the newest
-picture is delivered.
+picture is delivered, and later fewer; see ``picture_pace``.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from backbone.component.messages import WrongParameter
 from backbone.ranges import MOST_PX
 from backbone.waiting import end_tasks, set_within, settle
 from resource_pool.drivers.interface import DriverSite, FixedOption, HardwareFault, Picture
+from resource_pool.drivers.picture_pace import PicturePace
 from resource_pool.drivers.picture_turns import PictureTurns
 
 log = logging.getLogger(__name__)
@@ -65,7 +66,7 @@ class _Reading:
         opened: Done when the device is open, with its columns and rows, or with the fault.
         ends: Set when the thread is to close the device.
         has_ended: Set when the device is closed.
-        newest: The newest picture that is not delivered yet, its listener, and its machine time.
+        newest: The newest picture that is not delivered yet, its listener, and its machine times: taken, decoded.
         alive_s: Machine time of the last picture.
     """
 
@@ -73,7 +74,7 @@ class _Reading:
         self._loop = asyncio.get_running_loop()
         self.opened: asyncio.Future[tuple[int, int]] = self._loop.create_future()
         self.ends, self.has_ended = threading.Event(), asyncio.Event()
-        self.newest = deque[tuple[Picture, Deliver, float]](maxlen=1)
+        self.newest = deque[tuple[Picture, Deliver, float, float]](maxlen=1)
         self.alive_s = time.monotonic()
 
     def call(self, what: Callable[..., object], *given: object) -> None:
@@ -91,7 +92,7 @@ class VideoDevice:
         self._site = site
         self._options = site.options(VideoDeviceOptions)
         self._name = _named(self._options.device)
-        self._asked_hz: float = site.parameters.frame_rate_hz
+        self._pace = PicturePace(site.parameters.frame_rate_hz)
         self._delivers_hz = math.inf  # until it is measured
         self._deliver: Deliver | None = None
         self._remark = ""
@@ -107,12 +108,12 @@ class VideoDevice:
         """Apply the new rate from the next picture on."""
         if site.options(VideoDeviceOptions) != self._options:
             raise FixedOption(f"{site.resource} cannot change device or size of its pictures while it runs")
-        self._asked_hz = site.parameters.frame_rate_hz
+        self._pace.ask(site.parameters.frame_rate_hz)
         self._remark_rate()
 
     def allowed_hz(self) -> float:
-        """Return the rate of the device if it is lower than the requested one; see ``YieldingDriver``."""
-        return min(self._asked_hz, self._delivers_hz)
+        """Return the rate of the device or of a busy host, if lower than the requested one; see ``YieldingDriver``."""
+        return min(self._pace.allowed_hz, self._delivers_hz)
 
     async def open(self) -> None:
         """Open the device, and begin to take its pictures."""
@@ -173,7 +174,7 @@ class VideoDevice:
         begin_s, count = time.monotonic(), 0
         while not reading.ends.is_set():
             deliver = self._deliver  # before the picture is taken, so that none is older than the tuning
-            rate_hz = self._asked_hz * self._site.clock.rate
+            rate_hz = self._pace.allowed_hz * self._site.clock.rate
             if not capture.grab():
                 raise HardwareFault(f"{self._name} delivers no more pictures", remedy=UNPLUGGED)
             now_s = reading.alive_s = time.monotonic()
@@ -187,17 +188,20 @@ class VideoDevice:
                 continue
             picture = capture.picture(0.0)
             if picture is not None:
-                reading.newest.append((picture, deliver, now_s))
+                reading.newest.append((picture, deliver, now_s, time.monotonic()))
                 reading.call(self._hand_over, reading)
 
     def _hand_over(self, reading: _Reading) -> None:
         """Deliver the newest picture, unless an earlier call has done so."""
         if not reading.newest:
             return
-        picture, deliver, taken_s = reading.newest.pop()
-        if self._deliver is deliver and not reading.ends.is_set():
-            clock, ago_s = self._site.clock, time.monotonic() - taken_s
-            deliver(dataclasses.replace(picture, captured_s=clock.now_s() - ago_s * clock.rate))
+        picture, deliver, taken_s, decoded_s = reading.newest.pop()
+        if self._deliver is not deliver or reading.ends.is_set():
+            return
+        clock, now_s = self._site.clock, time.monotonic()
+        if self._pace.delivered(now_s - decoded_s, now_s):
+            self._remark_rate()
+        deliver(dataclasses.replace(picture, captured_s=clock.now_s() - (now_s - taken_s) * clock.rate))
 
     def _failed(self, reading: _Reading, error: Exception) -> None:
         if not reading.opened.done():
@@ -217,9 +221,10 @@ class VideoDevice:
         self._remark_rate()
 
     def _remark_rate(self) -> None:
-        """Show the device's rate if it is lower than the requested one."""
-        few = f"{self._delivers_hz:.2g} of {self._asked_hz:.3g} pictures a second: the device delivers no more"
-        remark = few if self._delivers_hz < FEW * self._asked_hz else ""
+        """Show the rate of a busy host, or else of the device, if it is lower than the requested one."""
+        asked_hz, remark = self._pace.asked_hz, self._pace.remark()
+        if not remark and self._delivers_hz < FEW * asked_hz:
+            remark = f"{self._delivers_hz:.2g} of {asked_hz:.3g} pictures a second: the device delivers no more"
         if remark != self._remark:
             self._remark = remark
             self._site.remark(remark)

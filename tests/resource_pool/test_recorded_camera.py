@@ -163,6 +163,28 @@ async def test_a_late_event_loop_gets_no_picture_from_before_the_tuning(footage:
     assert stage.seen[0][0] >= round(tuned_s, 6) - 1e-6
 
 
+class LateFilmClock(VirtualClock):
+    """A clock of a machine on which each sleeper wakes 20 ms late."""
+
+    async def sleep_until_s(self, at_s: float) -> None:
+        await super().sleep_until_s(at_s + 0.02)
+
+
+def test_on_a_full_processor_fewer_pictures_are_delivered_and_it_is_shown(footage: str) -> None:
+    async def play() -> Stage:
+        stage = Stage(LateFilmClock(), 10.0, file=footage, loop=True)
+        await stage.driver.open()
+        stage.driver.tune("video1", stage.deliver)
+        await stage.clock.sleep_until_s(20.0)
+        await stage.driver.close()
+        return stage
+
+    stage = run_virtual(play())
+    assert "6.67 of 10 pictures a second: control goes first on a full processor" in stage.remarks
+    assert stage.driver.allowed_hz() < 3.0
+    assert len(stage.seen) < 100
+
+
 async def test_a_picture_that_is_being_decoded_at_the_stop_is_not_delivered(
     footage: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

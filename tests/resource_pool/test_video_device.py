@@ -19,7 +19,7 @@ from small_videos import HEIGHT_PX, WIDTH_PX, number_of, video
 
 from backbone.bus.clock import MissionClock
 from backbone.component.messages import WrongParameter
-from resource_pool.drivers import opencv_pictures, video_device
+from resource_pool.drivers import opencv_pictures, picture_pace, video_device
 from resource_pool.drivers.interface import DriverSite, FixedOption, HardwareFault, Picture
 from resource_pool.drivers.video_device import VideoDevice
 
@@ -341,6 +341,24 @@ async def test_a_device_that_is_slower_than_requested_is_told(
     while bench.remarks[-1]:
         capture.show(1)
         await asyncio.sleep(0.001)
+    await close(bench, capture)
+
+
+async def test_on_a_full_processor_it_delivers_fewer_pictures_and_says_so(
+    capture: FakeCapture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(picture_pace, "WINDOW_S", 0.2)
+    bench = Bench(rate_hz=30.0)
+    await bench.open(capture)
+    bench.tune()
+    number, begun_s = 0, time.monotonic()
+    while not any("control goes first on a full processor" in remark for remark in bench.remarks):
+        assert time.monotonic() < begun_s + WITHIN_S
+        show_in_turn(capture, number)
+        time.sleep(2 * picture_pace.LATE_S)  # noqa: ASYNC251  the event loop is late
+        await asyncio.sleep(0)
+        number += 1
+    assert bench.driver.allowed_hz() < 30.0
     await close(bench, capture)
 
 
