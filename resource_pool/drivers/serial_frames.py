@@ -118,7 +118,8 @@ def _read(stuffed: bytes) -> SerialFrame | None:
     try:
         content = unstuffed(stuffed)
         inside, crc = content[:-CRC_BYTES], content[-CRC_BYTES:]
-        if len(inside) < HEAD_BYTES or binascii.crc_hqx(inside, CRC_BEGIN) != int.from_bytes(crc, "big"):
+        is_of_length = HEAD_BYTES <= len(inside) <= HEAD_BYTES + MOST_PAYLOAD_BYTES
+        if not is_of_length or binascii.crc_hqx(inside, CRC_BEGIN) != int.from_bytes(crc, "big"):
             return None
         return SerialFrame(SerialKind(inside[0]), inside[1], inside[HEAD_BYTES:])
     except ValueError:  # a frame without an end, or of a kind of a later version

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.ranges import MOST_PAYLOAD_BYTES
 from resource_pool.drivers.serial_frames import FrameReader, SerialFrame, SerialKind, line_bytes, stuffed, unstuffed
 
 PAYLOADS = st.binary(max_size=600) | st.binary(max_size=3).map(lambda some: some + bytes(300) + bytes([7]) * 600)
@@ -108,6 +109,12 @@ def test_a_line_of_noise_fills_no_memory_and_a_frame_after_it_is_read() -> None:
 @pytest.mark.parametrize("line", [b"\0\0\0", b"\0\x01\0", b"\0\x03\x01\x02\0", b"\0\xff\x01\0"])
 def test_what_is_too_short_is_no_frame(line: bytes) -> None:
     assert read(line) == []
+
+
+def test_a_frame_longer_than_a_payload_may_be_is_left_out() -> None:
+    longest = SerialFrame(SerialKind.REPLY, 3, bytes(MOST_PAYLOAD_BYTES))
+    assert read(line_bytes(longest)) == [longest]
+    assert read(line_bytes(SerialFrame(SerialKind.REPLY, 3, bytes(MOST_PAYLOAD_BYTES + 1)))) == []
 
 
 def test_a_frame_of_an_unknown_kind_is_left_out() -> None:
