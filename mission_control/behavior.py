@@ -26,13 +26,14 @@ from backbone.component.messages import Absence, LifeState, LogLevel
 from backbone.debug_views import ListViews, LookAt
 from backbone.exchange import SwapClass
 from backbone.launcher.messages import BranchTaken, TakeBranch
-from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
+from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode, PathStep
+from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.naming import component_of
 from backbone.reading_anew import WrongClass
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_exchange import BehaviorExchanges
 from mission_control.behavior_hooks import BehaviorHooks
-from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw
+from mission_control.behavior_tree import draw
 from mission_control.child_keeper import end_by_placer
 from mission_control.children import Children, Decision
 from mission_control.children_loop import ChildrenLoop
@@ -334,9 +335,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     def behavior_state(self) -> BehaviorState:
         """Return its progress."""
-        node = BehaviorNode(
-            self.launch.type, self.name, self.path[-1][1], arc=self.parameters.arc, children=self.parameters.children
-        )
+        children = tuple(self.parameters.children)
+        node = BehaviorNode(self.launch.type, self.name, self.path[-1][1], children=children)
         rules = self._children.rules
         label = "last branch; " if self.parameters.is_last else ""
         about_it = f"{label}{self.status}; {rules.sentence}" if rules.sentence else f"{label}{self.status}"

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+from backbone.mission.behavior_nodes import ArcNeed
 from backbone.mission.class_facts import ANY_ARC
 from backbone.wire import Message
-from mission_control.behavior_tree import ArcNeed
 from mission_control.children import Children, Decision
 from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import Frame

@@ -7,8 +7,7 @@ from collections.abc import Coroutine, Mapping, Sequence
 from typing import Protocol
 
 from backbone.component.component_of_parts import ComponentOfParts
-from backbone.mission.behavior_orders import PathStep
-from mission_control.behavior_tree import BehaviorNode
+from backbone.mission.behavior_nodes import BehaviorNode, PathStep
 from mission_control.children import Decision
 from mission_control.gated_bus import GatedBus
 from mission_control.messages import BehaviorStatus

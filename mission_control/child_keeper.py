@@ -13,6 +13,7 @@ from backbone.component.messages import Absence, LogLevel
 from backbone.creator.messages import ProcessFell, creator_name
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
+from backbone.mission.behavior_orders import behavior_order, node_of
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
@@ -74,7 +75,7 @@ class ChildKeeper:
         def order() -> Start:
             nonlocal latest
             latest = self._nodes.get(name, latest)
-            return latest.order(self._parent.path)
+            return behavior_order(node_of(latest), self._parent.path)
 
         try:
             stopped = await keep_placed(

@@ -17,9 +17,9 @@ from backbone.component.messages import WrongParameter
 from backbone.errors import complaint
 from backbone.exchange import NotExchanged, SwapClass
 from backbone.exchange_course import UNPROVED, class_path_of, hand_over
+from backbone.mission.behavior_nodes import BehaviorNode
 from backbone.reading_anew import WrongClass
 from backbone.wire import Accepts, Message
-from mission_control.behavior_tree import BehaviorNode
 from mission_control.gated_bus import GatedBus
 from mission_control.messages import BehaviorStatus
 

@@ -14,11 +14,11 @@ import msgspec
 
 from backbone.component.messages import Absence
 from backbone.errors import LinkError, Refusal
+from backbone.mission.behavior_nodes import ArcNeed
 from backbone.reading_anew import WrongClass
 from mission_control.acting import Acting, cancel
 from mission_control.behavior_hooks import BehaviorHooks, suspended_because
 from mission_control.behavior_of_parts import BehaviorOfParts
-from mission_control.behavior_tree import ArcNeed
 from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_task, why
 from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import (
@@ -132,7 +132,7 @@ class OwnArc:
             minimum_runtime_s=need.minimum_runtime_s,
             maximum_runtime_s=need.maximum_runtime_s,
             wish=need.wish,
-            features=need.features,
+            features={role: list(names) for role, names in need.features.items()},
             usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
             stops_at_once=self._commands_nothing,
             may_say_not_now=type(self._hooks).not_now is not BehaviorHooks.not_now,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -21,8 +21,8 @@ from backbone.dependency_database.inventory import Inventory
 from backbone.dependency_database.messages import FindRcs
 from backbone.dry_run.hang_watch import Hangs, Progress, result_unless_it_hangs
 from backbone.errors import BackboneError, Refusal, code_of, complaint
-from backbone.mission.behavior_orders import PathStep
-from backbone.mission.model import ArcWish, BehaviorDescription, MissionDescription
+from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode, PathStep, walk
+from backbone.mission.model import MissionDescription
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import NoHost
 from backbone.placer.placement import CandidateHost, place
@@ -213,7 +213,7 @@ def placements(description: MissionDescription) -> list[Placed]:
         counts[found[-1].host] += 1
         return bool(found[-1].host)
 
-    def start_branch(behavior: BehaviorDescription) -> None:
+    def start_branch(behavior: BehaviorNode) -> None:
         if not start(behavior.type, behavior.name):
             return
         if behavior.arc is not None:
@@ -248,7 +248,7 @@ class _BehaviorClaim:
     """A behavior's claim, or why the behavior cannot claim."""
 
     arc: str
-    behavior: BehaviorDescription
+    behavior: BehaviorNode
     path: Sequence[PathStep]
     request: SchedulingRequest | None
     obstacle: str = ""
@@ -262,7 +262,7 @@ def requests(description: MissionDescription) -> list[SchedulingRequest]:
 def _claims(description: MissionDescription) -> Iterator[_BehaviorClaim]:
     inventory = Inventory(description.resources)
     needs = {one.name: one.needs for one in description.types}
-    for path, behavior in _walk(description.behaviors, [(description.name, description.priority)]):
+    for path, behavior in walk(description.behaviors, [(description.name, description.priority)]):
         wish = behavior.arc
         if wish is None:
             continue
@@ -284,15 +284,6 @@ def _claims(description: MissionDescription) -> Iterator[_BehaviorClaim]:
             sharable=inventory.sharable(sets),
         )
         yield _BehaviorClaim(arc, behavior, path, request)
-
-
-def _walk(
-    behaviors: Iterable[BehaviorDescription], above: Sequence[PathStep]
-) -> Iterator[tuple[list[PathStep], BehaviorDescription]]:
-    for behavior in behaviors:
-        path = [*above, (behavior.name, behavior.priority)]
-        yield path, behavior
-        yield from _walk(behavior.children, path)
 
 
 def _ask(
@@ -331,7 +322,7 @@ def _claimed(
     )
 
 
-def _arc_name(behavior: BehaviorDescription, wish: ArcWish) -> str:
+def _arc_name(behavior: BehaviorNode, wish: ArcNeed) -> str:
     return f"{behavior.name}-{wish.kind}"
 
 

@@ -7,12 +7,13 @@ behavior ends, and starts as the file now declares it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from backbone.mission.behavior_orders import PLACE_PARAMETERS, PathStep, behavior_order, node_of
-from backbone.mission.model import BehaviorDescription, MissionDescription
+from backbone.mission.behavior_nodes import walk
+from backbone.mission.behavior_orders import PLACE_PARAMETERS, behavior_order, node_of
+from backbone.mission.model import MissionDescription
 from backbone.placer.messages import Start
 
 PRIORITY, RUN_TIMES = "priority", ("minimum_runtime_s", "maximum_runtime_s")
@@ -127,12 +128,8 @@ def _revised(before: Start, after: Start) -> dict[str, Any]:
 
 def _nodes(mission: MissionDescription) -> dict[str, _Known]:
     found: dict[str, _Known] = {}
-
-    def walk(behaviors: Sequence[BehaviorDescription], parent: str, path: Sequence[PathStep]) -> None:
-        for one in behaviors:
-            order = behavior_order(node_of(one), path)
-            found[one.name] = _Known(parent, order, one.priority, tuple(child.name for child in one.children))
-            walk(one.children, one.name, [*path, (one.name, one.priority)])
-
-    walk(mission.behaviors, "", [(mission.name, mission.priority)])
+    for (*above, _own), node in walk(mission.behaviors, [(mission.name, mission.priority)]):
+        parent = above[-1][0] if len(above) > 1 else ""
+        order = behavior_order(node_of(node), above)
+        found[node.name] = _Known(parent, order, node.priority, tuple(child.name for child in node.children))
     return found

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from backbone.errors import Refusal
+from backbone.mission.behavior_nodes import BehaviorNode, PathStep
 from backbone.placer.messages import Start
 
 if TYPE_CHECKING:
-    from backbone.mission.model import BehaviorDescription, MissionDescription
+    from backbone.mission.model import MissionDescription
 
-PathStep = tuple[str, int]
 Node = Mapping[str, Any]
 """A node of the behavior tree as plain data, with the nodes below it."""
 PLACE_PARAMETERS = ("path", "arc", "children")
@@ -80,13 +80,13 @@ def behavior_order(node: Node, parent_path: Sequence[PathStep]) -> Start:
     return Start(node["type"], node["name"], {**own, **tree}, process=node.get("process", ""))
 
 
-def node_of(behavior: BehaviorDescription) -> Node:
+def node_of(behavior: BehaviorNode) -> Node:
     """Return the node of the tree as plain data, as a message carries it."""
     node: Node = msgspec.msgpack.decode(msgspec.msgpack.encode(behavior))
     return node
 
 
-def _node(behavior: BehaviorDescription) -> Node:
+def _node(behavior: BehaviorNode) -> Node:
     node = node_of(behavior)
     _refuse_reserved(node)
     return node

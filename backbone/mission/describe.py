@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from backbone.component.abilities import NO_ABILITIES
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
+from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.elements import (
     ArcAttributes,
@@ -24,8 +25,6 @@ from backbone.mission.declaration.parts import Declared, ParameterElement
 from backbone.mission.declaration.world_elements import AirElement, TargetElement, WorldElement
 from backbone.mission.model import (
     EXECUTION_UNIT,
-    ArcWish,
-    BehaviorDescription,
     ComponentDescription,
     CoreServiceDescription,
     Host,
@@ -148,8 +147,8 @@ def _unit(
     )
 
 
-def _behavior(declared: BehaviorElement) -> BehaviorDescription:
-    return BehaviorDescription(
+def _behavior(declared: BehaviorElement) -> BehaviorNode:
+    return BehaviorNode(
         **declared.model_dump(include=set(BehaviorAttributes.model_fields), exclude_defaults=True),
         parameters=_parameters(declared.parameter),
         arc=None if declared.arc is None else _arc(declared.arc),
@@ -157,8 +156,8 @@ def _behavior(declared: BehaviorElement) -> BehaviorDescription:
     )
 
 
-def _arc(declared: ArcElement) -> ArcWish:
-    return ArcWish(
+def _arc(declared: ArcElement) -> ArcNeed:
+    return ArcNeed(
         **declared.model_dump(include=set(ArcAttributes.model_fields), exclude_defaults=True),
         wish={wish.type: wish.name for wish in declared.wish if wish.name},
         features={wish.type: wish.features for wish in declared.wish if wish.features},

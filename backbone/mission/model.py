@@ -10,6 +10,7 @@ import msgspec
 from backbone.authentication import HUB_PORT, is_loopback
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
+from backbone.mission.behavior_nodes import BehaviorNode
 
 EXECUTION_UNIT = "execution_unit"  # the shipped type that runs modules
 
@@ -63,50 +64,6 @@ class ComponentDescription(msgspec.Struct, frozen=True, kw_only=True):
     process: str = ""
 
 
-class ArcWish(msgspec.Struct, frozen=True, kw_only=True):
-    """The ARC a behavior needs.
-
-    Attributes:
-        kind: Component type of the ARC.
-        minimum_runtime_s: Shortest time in which the behavior can do something useful, seconds.
-        maximum_runtime_s: Longest slice with all extensions, seconds; 0: the minimum.
-        period_s: Interval between its radio packets, seconds.
-        packet_time_s: Time one of its radio packets is on the air, seconds.
-        wish: Role → name.
-        features: Role → features.
-    """
-
-    kind: str
-    minimum_runtime_s: float
-    maximum_runtime_s: float = 0.0
-    period_s: float = 0.05
-    packet_time_s: float = 0.002
-    wish: dict[str, str] = {}
-    features: dict[str, tuple[str, ...]] = {}
-
-
-class BehaviorDescription(msgspec.Struct, frozen=True, kw_only=True):
-    """A node of the behavior tree.
-
-    Attributes:
-        type: Its component type.
-        name: Name of the behavior, unique in the mission.
-        priority: Its priority among its siblings; larger is higher.
-        process: Name of the process it shares with others; empty: a process of its own.
-        parameters: Values for the class's parameters.
-        arc: The ARC it needs, if any.
-        children: Nodes its parent starts.
-    """
-
-    type: str
-    name: str
-    priority: int
-    process: str = ""
-    parameters: dict[str, Any] = {}
-    arc: ArcWish | None = None
-    children: tuple[BehaviorDescription, ...] = ()
-
-
 class LastBranchDescription(msgspec.Struct, frozen=True, kw_only=True):
     """The branch of the behavior tree that runs when the mission is ordered to end.
 
@@ -115,7 +72,7 @@ class LastBranchDescription(msgspec.Struct, frozen=True, kw_only=True):
         within_s: Its time from its start, seconds of the mission, above 0.
     """
 
-    behavior: BehaviorDescription
+    behavior: BehaviorNode
     within_s: float
 
 
@@ -142,7 +99,7 @@ class MissionDescription(msgspec.Struct, frozen=True, kw_only=True):
     types: tuple[ComponentType, ...]
     resources: tuple[Resource, ...]
     components: tuple[ComponentDescription, ...]
-    behaviors: tuple[BehaviorDescription, ...]
+    behaviors: tuple[BehaviorNode, ...]
     source: str
     last: LastBranchDescription | None = None
     units: tuple[ComponentDescription, ...] = ()

@@ -12,10 +12,10 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.keys import Conversation
+from backbone.mission.behavior_nodes import walk
 from backbone.spoken import counted
 from backbone.wire import Envelope
 from mission_control.behavior import Behavior, BehaviorParameters
-from mission_control.behavior_tree import walk
 from mission_control.children import Decision
 from mission_control.messages import BehaviorStatus, MotionSeen
 

@@ -17,13 +17,13 @@ from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
+from backbone.mission.behavior_nodes import ArcNeed
 from backbone.naming import Subsystem, address
 from backbone.ranges import A_DAY_S
 from backbone.spoken import counted
 from backbone.wire import Message
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
-from mission_control.behavior_tree import ArcNeed
 from mission_control.behaviors.run_times import RunTimes, useful_run_times
 from mission_control.messages import GreyPicture, MotionSeen, PictureJudged, Region, SwappedIn
 from mission_control.modules.orders import output_address

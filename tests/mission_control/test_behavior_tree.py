@@ -1,16 +1,18 @@
 """The tree's paths and drawing."""
 
-from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw, walk
+from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode, walk
+from backbone.mission.behavior_orders import behavior_order, node_of
+from mission_control.behavior_tree import draw
 
 TREE = [
     BehaviorNode(
         "surveillance",
         "watch",
         5,
-        children=[
+        children=(
             BehaviorNode("watch_for_motion", "left", 3, {"again_after_s": 2.0}, ArcNeed("capture", 5.0)),
             BehaviorNode("watch_for_motion", "right", 4),
-        ],
+        ),
     ),
     BehaviorNode("wander", "wander", 1),
 ]
@@ -32,7 +34,7 @@ def test_the_drawing_puts_higher_siblings_first_and_says_what_is_remarked() -> N
 
 
 def test_a_node_orders_itself_with_its_own_parameters_beside_the_trees() -> None:
-    order = TREE[0].children[0].order([("mission", 10), ("watch", 5)])
+    order = behavior_order(node_of(TREE[0].children[0]), [("mission", 10), ("watch", 5)])
     assert order.parameters["again_after_s"] == 2.0
     assert order.parameters["path"][-1] == ["left", 3]
     assert order.parameters["arc"]["kind"] == "capture"

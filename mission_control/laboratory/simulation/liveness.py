@@ -26,7 +26,7 @@ from mission_control.laboratory.simulation.audit import Audit, Happening
 from mission_control.laboratory.simulation.audited_pool import AuditedRcManager
 from mission_control.laboratory.simulation.laws import Broken
 from mission_control.laboratory.simulation.simulated_machines import Machines
-from mission_control.laboratory.simulation.supervised_shape import CORE, SupervisedShape, arc_of, walk
+from mission_control.laboratory.simulation.supervised_shape import CORE, SupervisedShape, arc_of
 
 RUNS_AGAIN_S = 40.0
 """Chosen: hung for 3 s, ended within 2 s, restarted after at most 2 s, while its owner compares every 20 s and then
@@ -40,15 +40,14 @@ class Watcher:
 
     def __init__(self, shape: SupervisedShape, machines: Machines, audit: Audit, clock: Clock) -> None:
         self._machines, self._audit, self._clock = machines, audit, clock
-        nodes = list(walk(shape.trees))
         self._core = ["nameserver", *(name for name in CORE if name != "creator"), *map(creator_name, shape.hosts)]
         self._wanted = [
             *self._core,
             *(resource.name for resource in shape.pool.resources),
             *(owner.name for owner in shape.pool.owners),
-            *(node.name for node in nodes),
+            *(node.name for node in shape.nodes),
         ]
-        self._arcs = [arc_of(node) for node in nodes if node.arc is not None]
+        self._arcs = [arc_of(node) for node in shape.nodes if node.arc is not None]
         self._calm_arcs = [*self._arcs, *(owner.arc for owner in shape.pool.owners if not owner.rests)]
         self._missing_since_s: dict[str, float] = {}
         self._absent: list[Absence] = []

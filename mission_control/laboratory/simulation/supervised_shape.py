@@ -5,7 +5,6 @@ Pure: the same seed gives the same mission, in every process and on every machin
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from random import Random
 
@@ -14,9 +13,8 @@ import msgspec
 from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import creator_name
 from backbone.dependency_database.messages import Resource
+from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode, walk
 from backbone.mission.model import (
-    ArcWish,
-    BehaviorDescription,
     ComponentDescription,
     CoreServiceDescription,
     Host,
@@ -55,18 +53,22 @@ class SupervisedShape:
     pool: MissionShape
     hosts: tuple[str, ...]
     places: dict[str, str]
-    trees: tuple[BehaviorDescription, ...]
+    trees: tuple[BehaviorNode, ...]
+
+    @property
+    def nodes(self) -> list[BehaviorNode]:
+        """All nodes of its trees, parents before their children."""
+        return [node for _path, node in walk(self.trees)]
 
     def groups(self) -> list[list[str]]:
         """Return the targets of faults, by kind: core services, creators, RCs, ARCs, owners, nodes of the tree."""
-        nodes = list(walk(self.trees))
         return [
             ["nameserver", *(name for name in CORE if name != "creator")],
             [creator_name(host) for host in self.hosts],
             [resource.name for resource in self.pool.resources],
-            [owner.arc for owner in self.pool.owners] + [arc_of(node) for node in nodes if node.arc is not None],
+            [owner.arc for owner in self.pool.owners] + [arc_of(node) for node in self.nodes if node.arc is not None],
             [owner.name for owner in self.pool.owners],
-            [node.name for node in nodes],
+            [node.name for node in self.nodes],
         ]
 
     def tree_paths(self) -> list[tuple[tuple[str, int], ...]]:
@@ -124,14 +126,7 @@ class SupervisedShape:
         return {"grace_s": self.pool.grace_s, "policy": self.pool.policy} if service == "rc_manager" else {}
 
 
-def walk(nodes: tuple[BehaviorDescription, ...]) -> Iterator[BehaviorDescription]:
-    """Yield every node, parents before their children."""
-    for node in nodes:
-        yield node
-        yield from walk(node.children)
-
-
-def arc_of(node: BehaviorDescription) -> str:
+def arc_of(node: BehaviorNode) -> str:
     """Return the name of the node's ARC."""
     assert node.arc is not None  # noqa: S101  called only for nodes that have an ARC
     return f"{node.name}-{node.arc.kind}"
@@ -147,22 +142,22 @@ def draw_supervised_shape(seed: int) -> SupervisedShape:
     return SupervisedShape(seed, pool, hosts, places, trees)
 
 
-def _tree(dice: Random, name: str, resources: tuple[Resource, ...]) -> BehaviorDescription:
+def _tree(dice: Random, name: str, resources: tuple[Resource, ...]) -> BehaviorNode:
     process = SHARED_PROCESS if dice.random() < 0.4 else ""
     leaves = tuple(
         _node(dice, f"{name}-leaf{number}", resources, process) for number in range(1, dice.randint(1, 3) + 1)
     )
-    tree = BehaviorDescription(type="node", name=name, priority=0, children=leaves)
+    tree = BehaviorNode(type="node", name=name, priority=0, children=leaves)
     return _sharing(tree, "" if dice.random() < 0.5 else process)
 
 
-def _node(dice: Random, name: str, resources: tuple[Resource, ...], process: str) -> BehaviorDescription:
+def _node(dice: Random, name: str, resources: tuple[Resource, ...], process: str) -> BehaviorNode:
     scouts = [resource.name for resource in resources if resource.type == "scout"]
     wish = {"scout": dice.choice(scouts)} if dice.random() < 0.5 else {}
-    arc = ArcWish(kind="drive", wish=wish, minimum_runtime_s=NODE_RUNTIME_S, period_s=0.4, packet_time_s=0.02)
-    node = BehaviorDescription(type="node", name=name, priority=0, arc=arc if dice.random() < 0.7 else None)
+    arc = ArcNeed(kind="drive", wish=wish, minimum_runtime_s=NODE_RUNTIME_S, period_s=0.4, packet_time_s=0.02)
+    node = BehaviorNode(type="node", name=name, priority=0, arc=arc if dice.random() < 0.7 else None)
     return _sharing(node, process)
 
 
-def _sharing(node: BehaviorDescription, process: str) -> BehaviorDescription:
+def _sharing(node: BehaviorNode, process: str) -> BehaviorNode:
     return msgspec.structs.replace(node, process=process) if process else node

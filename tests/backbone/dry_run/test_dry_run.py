@@ -18,14 +18,8 @@ from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.dry_run.run import dry_run, placements, requests
 from backbone.dry_run.screen import bars, screen
-from backbone.mission.model import (
-    ArcWish,
-    BehaviorDescription,
-    CoreServiceDescription,
-    Host,
-    LastBranchDescription,
-    MissionDescription,
-)
+from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode
+from backbone.mission.model import CoreServiceDescription, Host, LastBranchDescription, MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
 from backbone.scheduling.requests import RcUse, Usage
@@ -34,7 +28,7 @@ MISSION_XML = Path(__file__).parents[3] / "mission.xml"
 
 
 def mission(
-    *behaviors: BehaviorDescription, tags: tuple[str, ...] = (), robots: int = 2, **types: list[str]
+    *behaviors: BehaviorNode, tags: tuple[str, ...] = (), robots: int = 2, **types: list[str]
 ) -> MissionDescription:
     """Return a mission with one radio, one video frequency, two robots and these behaviors.
 
@@ -66,15 +60,15 @@ def mission(
     )
 
 
-def watch(name: str, priority: int = 1, *, robot: str = "", run_s: float = 5.0, **more: Any) -> BehaviorDescription:
-    arc = ArcWish(
+def watch(name: str, priority: int = 1, *, robot: str = "", run_s: float = 5.0, **more: Any) -> BehaviorNode:
+    arc = ArcNeed(
         kind="capture",
         wish={"scout": robot} if robot else {},
         minimum_runtime_s=run_s,
         period_s=0.1,
         packet_time_s=more.pop("packet_time_s", 0.01),
     )
-    return BehaviorDescription(type="watch", name=name, priority=priority, arc=arc, **more)
+    return BehaviorNode(type="watch", name=name, priority=priority, arc=arc, **more)
 
 
 def test_components_spread_over_equal_hosts() -> None:
@@ -102,7 +96,7 @@ def test_a_component_no_host_can_take_goes_nowhere_and_its_requests_wait_visibly
 
 
 def test_children_of_a_behavior_without_a_host_do_not_start() -> None:
-    parent = watch("parent", children=(BehaviorDescription(type="capture", name="child", priority=1),))
+    parent = watch("parent", children=(BehaviorNode(type="capture", name="child", priority=1),))
     dry = dry_run(mission(parent, watch=["gl"]))
     assert "child" not in [one.name for one in dry.placed]
     assert dry.claimed[0].refused == "parent has no host, so no ARC is asked for"
@@ -138,7 +132,7 @@ def test_a_lower_behavior_never_runs_and_the_higher_one_is_named() -> None:
 
 
 def test_priorities_count_by_place_in_the_tree() -> None:
-    group = BehaviorDescription(type="watch", name="group", priority=5, children=(watch("child", 1, robot="scout1"),))
+    group = BehaviorNode(type="watch", name="group", priority=5, children=(watch("child", 1, robot="scout1"),))
     dry = dry_run(mission(watch("other", 4, robot="scout2"), group))
     other, child = dry.claimed
     assert (other.never_runs, child.never_runs) == (True, False)
@@ -165,7 +159,7 @@ def test_two_claims_of_any_robot_get_two_robots() -> None:
 
 def test_its_requests_are_those_the_arcs_of_the_mission_send() -> None:
     """The real ARC makes its request from what its behavior starts it with; both are the same."""
-    from mission_control.behavior_tree import BehaviorNode, walk
+    from backbone.mission.behavior_nodes import walk
     from resource_pool.arc_client import PathNode, claim_parameters
     from resource_pool.arc_request import ArcParameters
 
@@ -196,7 +190,7 @@ def test_its_requests_are_those_the_arcs_of_the_mission_send() -> None:
 
 
 def test_the_last_branch_is_tried_by_itself_and_must_find_what_it_needs() -> None:
-    def ends_with(branch: BehaviorDescription) -> MissionDescription:
+    def ends_with(branch: BehaviorNode) -> MissionDescription:
         last = LastBranchDescription(behavior=branch, within_s=20.0)
         return msgspec.structs.replace(mission(watch("day", robot="scout1")), last=last)
 

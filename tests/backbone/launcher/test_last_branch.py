@@ -18,13 +18,14 @@ from backbone.component_database.messages import ComponentType
 from backbone.keys import Conversation
 from backbone.launcher.last_branch import LastBranch, LastStage, ends_before, how_it_finished
 from backbone.launcher.last_run import run_last
+from backbone.mission.behavior_nodes import BehaviorNode
 from backbone.mission.behavior_orders import last_order
-from backbone.mission.model import BehaviorDescription, LastBranchDescription, MissionDescription
+from backbone.mission.model import LastBranchDescription, MissionDescription
 from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost
 from backbone.wire import Envelope
 
-HOME = LastBranchDescription(behavior=BehaviorDescription(type="patrol", name="home", priority=1), within_s=60.0)
+HOME = LastBranchDescription(behavior=BehaviorNode(type="patrol", name="home", priority=1), within_s=60.0)
 AT = "mission_control/home"
 STEPS = st.lists(st.sampled_from(["order", "now", "began", "finished", "time", "refused"]), max_size=12)
 

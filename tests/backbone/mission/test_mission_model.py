@@ -7,16 +7,17 @@ import pytest
 from pydantic_core import PydanticUndefined
 
 from backbone.dependency_database.messages import Resource
+from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode
 from backbone.mission.declaration.elements import ArcAttributes, BehaviorAttributes, HostElement, ResourceElement
 from backbone.mission.declaration.parts import Declared
-from backbone.mission.model import ArcWish, BehaviorDescription, Host
+from backbone.mission.model import Host
 
 
 @pytest.mark.parametrize(
     ("declared", "described"),
     [
-        (ArcAttributes, ArcWish),
-        (BehaviorAttributes, BehaviorDescription),
+        (ArcAttributes, ArcNeed),
+        (BehaviorAttributes, BehaviorNode),
         (HostElement, Host),
         (ResourceElement, Resource),
     ],

@@ -13,7 +13,8 @@ from behaviors_at_work import EXAMPLES, at_work, pose
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
-from backbone.mission.model import BehaviorDescription, MissionDescription
+from backbone.mission.behavior_nodes import BehaviorNode
+from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from mission_control.laboratory.simulation.whole_mission import RunningMission
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus
@@ -54,7 +55,7 @@ class Ends:
             self.of.setdefault(event.subject, []).append(BehaviorStatus(event.what.removeprefix("finished: ")))
 
 
-def wanted(node: BehaviorDescription, ends: Ends) -> BehaviorStatus | None:
+def wanted(node: BehaviorNode, ends: Ends) -> BehaviorStatus | None:
     """Return what the node's children make of it, by the meaning of its type alone; None: it does not finish."""
     if not node.children:
         return next(iter(ends.of.get(node.name, [])), None)
@@ -71,7 +72,7 @@ def wanted(node: BehaviorDescription, ends: Ends) -> BehaviorStatus | None:
     return None
 
 
-def nodes(node: BehaviorDescription) -> list[BehaviorDescription]:
+def nodes(node: BehaviorNode) -> list[BehaviorNode]:
     return [node, *(one for child in node.children for one in nodes(child))]
 
 

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import Parameters, SetParameter
 from backbone.keys import Conversation
+from backbone.mission.behavior_nodes import BehaviorNode
 from backbone.mission.behavior_orders import behavior_orders
-from backbone.mission.model import BehaviorDescription, MissionDescription
+from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from mission_control.behaviors.follow import Follow, FollowParameters
 from mission_control.behaviors.go_to import Goer, GoToParameters
@@ -29,7 +30,7 @@ GO, HOME, FOLLOW, ROBOT = "go-out", "go-home", "follow-scout1", "scout1"
 GOAL, BEGIN = (3.0, 2.0), (1.0, 1.0)
 
 
-def all_of(behaviors: tuple[BehaviorDescription, ...]) -> list[BehaviorDescription]:
+def all_of(behaviors: tuple[BehaviorNode, ...]) -> list[BehaviorNode]:
     return [one for behavior in behaviors for one in (behavior, *all_of(behavior.children))]
 
 
