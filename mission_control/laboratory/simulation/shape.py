@@ -40,8 +40,7 @@ POOL_TYPES = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class OwnerShape:
+class OwnerShape(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A decision process and the ARC that it claims.
 
     Attributes:
@@ -99,19 +98,7 @@ class MissionShape:
 
     def owner_parameters(self, owner: OwnerShape) -> dict[str, object]:
         """Return the parameters of this decision process, a ``SimulatedOwner``."""
-        return {
-            "seed": self.seed,
-            "kind": owner.kind,
-            "path": [list(node) for node in owner.path],
-            "console": owner.console,
-            "minimum_runtime_s": owner.minimum_runtime_s,
-            "maximum_runtime_s": owner.maximum_runtime_s,
-            "wish": owner.wish,
-            "usage": msgspec.to_builtins(owner.usage),
-            "begins_s": owner.begins_s,
-            "calm_at_s": self.active_s,
-            "rests": owner.rests,
-        }
+        return {"seed": self.seed, "shape": msgspec.to_builtins(owner), "calm_at_s": self.active_s}
 
 
 def draw_shape(seed: int) -> MissionShape:

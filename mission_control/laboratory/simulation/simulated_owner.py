@@ -22,6 +22,7 @@ from backbone.scheduling.requests import PathNode
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.audit import current_audit
+from mission_control.laboratory.simulation.shape import OwnerShape
 from resource_pool.arc_client import (
     ArcClient,
     ArcNotice,
@@ -29,7 +30,6 @@ from resource_pool.arc_client import (
     Resumed,
     Suspended,
     Suspending,
-    Usage,
     arc_name,
     claim_parameters,
     notice_arc,
@@ -44,29 +44,16 @@ TOP_WHEEL_SPEED_RAD_S = 10.0  # chosen: below the motor's limit
 
 
 class OwnerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Parameters of a simulated owner; see ``claim_parameters``.
+    """Parameters of a simulated owner.
 
     Attributes:
         seed: Seed of its moods.
-        kind: Kind of its ARC.
-        path: Its place in the behavior tree.
-        console: True for a console.
-        begins_s: Mission time of its first claim.
         calm_at_s: Mission time from which the owner only drives.
-        rests: True if the owner releases its ARC at that time.
     """
 
     seed: int
-    kind: str
-    path: list[tuple[str, int]]
-    console: bool
-    minimum_runtime_s: float
-    maximum_runtime_s: float
-    wish: dict[str, str]
-    usage: Usage
-    begins_s: float
+    shape: OwnerShape
     calm_at_s: float
-    rests: bool
 
 
 class SimulatedOwner(Component[OwnerParameters]):
@@ -85,11 +72,11 @@ class SimulatedOwner(Component[OwnerParameters]):
 
     async def serve(self) -> None:
         """Claim, use and release the ARC repeatedly; in the calm keep the ARC and drive, or rest."""
-        await self.clock.sleep_until_s(self.parameters.begins_s)
+        await self.clock.sleep_until_s(self.parameters.shape.begins_s)
         while not self._is_calm():
             await self._live_with_arc()
             await self._until_calm_or(self._dice.uniform(0.1, 3.0))
-        if not self.parameters.rests:
+        if not self.parameters.shape.rests:
             await self._live_with_arc()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -121,7 +108,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         self._audit.note(self.name, "suspended", arc=notice.arc, reason=notice.reason, by=notice.by)
 
     async def _live_with_arc(self) -> None:
-        arc = self._arc = ArcClient(self.bus, arc_name(self.bus, self.parameters.kind), self)
+        arc = self._arc = ArcClient(self.bus, arc_name(self.bus, self.parameters.shape.kind), self)
         self._audit.note(self.name, "claims", arc=arc.arc)
         keeping = asyncio.create_task(self._keep(arc), name=f"{self.name}:keep")
         driving = asyncio.create_task(self._drive(arc), name=f"{self.name}:drive")
@@ -137,7 +124,7 @@ class SimulatedOwner(Component[OwnerParameters]):
 
     async def _have_moods(self, arc: ArcClient) -> None:
         """Change the requests until the ARC is released; in the calm want time and never release."""
-        dice, given = self._dice, self.parameters
+        dice, given = self._dice, self.parameters.shape
         while not self._is_calm():
             await self._until_calm_or(dice.uniform(0.2, 2.5))
             mood = dice.choice(("idle", "want", "want", "runtime", "longer", "nothing", "nothing", "release"))
@@ -160,7 +147,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         await asyncio.Event().wait()
 
     async def _keep(self, arc: ArcClient) -> None:
-        given = self.parameters
+        given = self.parameters.shape
         parameters = claim_parameters(
             self.address,
             path=[PathNode(name, priority) for name, priority in given.path],
