@@ -16,12 +16,12 @@ import errno
 import os
 import socket
 import stat
-import struct
 import weakref
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from backbone.errors import Refusal
+from backbone.operating_system import local_sockets
 
 try:
     import fcntl
@@ -37,7 +37,6 @@ _NO_MORE_WRITE = 0x10  # F_SEAL_FUTURE_WRITE of linux/fcntl.h, since Linux 5.1; 
 MOST_MAPPED = 256  # chosen: Python keeps a descriptor for each mapping, and a process may have 1024 by default
 MOST_DESCRIPTORS = 2  # of one packet
 _CUT = int(socket.MSG_TRUNC | socket.MSG_CTRUNC)  # a number, because joining two flags takes 3 µs (measured)
-_PEER = struct.Struct("3i")  # pid, uid, gid
 _mapped: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
@@ -261,7 +260,7 @@ def remove(directory: Path, name: str) -> None:
 
 
 def listen(directory: Path, name: str) -> socket.socket:
-    """Return a socket that accepts connections at a name of the folder; a socket of a dead process is replaced.
+    """Return a socket for ``local_sockets.accept`` at a name of the folder; a socket of a dead process is replaced.
 
     Raises:
         ForeignFolder: Another user could enter the folder.
@@ -280,17 +279,6 @@ def listen(directory: Path, name: str) -> socket.socket:
     return made
 
 
-def accept(listening: socket.socket) -> socket.socket:
-    """Return the next connection without waiting. The caller checks the user of its peer.
-
-    Raises:
-        OSError: There is none (``BlockingIOError``), or the system refuses it.
-    """
-    made, _address = listening.accept()
-    made.setblocking(False)
-    return made
-
-
 def connect(directory: Path, name: str) -> socket.socket:
     """Return a connection to the process that listens at a name of the folder. Never waits.
 
@@ -303,15 +291,9 @@ def connect(directory: Path, name: str) -> socket.socket:
         made.setblocking(False)
         with _place(directory, name) as path:
             made.connect(path)
-        if not is_own(made):
+        if not local_sockets.is_own(made):
             raise ForeignFolder(f"{directory / name} is the socket of another user")
     except BaseException:
         made.close()
         raise
     return made
-
-
-def is_own(connected: socket.socket) -> bool:
-    """Return whether the process at the other end belongs to this user."""
-    _pid, user, _group = _PEER.unpack(connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
-    return bool(user == os.geteuid())

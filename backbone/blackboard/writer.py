@@ -29,6 +29,7 @@ from backbone.blackboard.values import (
     files_of,
     require_short,
 )
+from backbone.operating_system import local_sockets
 
 ACCEPT_AGAIN_S = 1.0  # chosen: as long as asyncio's own servers wait (asyncio.constants.ACCEPT_RETRY_DELAY)
 
@@ -241,9 +242,11 @@ class BlackboardWriter:
     def _accept(self) -> None:
         while True:
             try:
-                connection = sealed_memory.accept(self._listening)
+                connection = local_sockets.accept(self._listening)
             except BlockingIOError:
                 return
+            except PermissionError:  # of another user; it is closed
+                continue
             except OSError as error:  # no descriptors are left: a new reader waits
                 log.warning("no further reader for now: %s", error)
                 self._events.remove(self._listening.fileno())
@@ -251,9 +254,6 @@ class BlackboardWriter:
                 if self._loop is not None:
                     self._loop.call_later(ACCEPT_AGAIN_S, self._accept_again)
                 return
-            if not sealed_memory.is_own(connection):
-                connection.close()
-                continue
             self._readers[connection.fileno()] = _ConnectedReader(connection)
             self._events.add(connection)
             self._hear(connection.fileno())

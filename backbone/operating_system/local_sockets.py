@@ -81,9 +81,18 @@ def require_own(connected: socket.socket) -> None:
     Raises:
         PermissionError: It belongs to another user.
     """
+    if not is_own(connected):
+        raise PermissionError(f"the process at the other end belongs to user {_user_of(connected)}")
+
+
+def is_own(connected: socket.socket) -> bool:
+    """Return whether the process at the other end belongs to this user."""
+    return _user_of(connected) == os.geteuid()
+
+
+def _user_of(connected: socket.socket) -> int:
     _pid, user, _group = _PEER.unpack(connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
-    if user != os.geteuid():
-        raise PermissionError(f"the process at the other end belongs to user {user}")
+    return int(user)
 
 
 def _at(name: str) -> str:

@@ -23,6 +23,7 @@ from backbone.blackboard.sealed_memory import MOST_MAPPED, ForeignFolder
 from backbone.blackboard.values import MOST_IN_PACKET, NoWriter, WriterStands
 from backbone.blackboard.values import ValueTooLong as TooLong
 from backbone.blackboard.writer import BlackboardWriter
+from backbone.operating_system import local_sockets
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -304,7 +305,7 @@ def test_a_folder_that_others_can_enter_is_refused(folder: Path) -> None:
 def test_a_process_of_another_user_is_not_admitted(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     writer = BlackboardWriter(folder, "room")
     reader = BlackboardReader(folder, "room")
-    monkeypatch.setattr(sealed_memory, "is_own", lambda _connected: False)
+    monkeypatch.setattr(local_sockets, "is_own", lambda _connected: False)
     writer.put(b"secret")
     with pytest.raises(NoWriter):
         reader.newest()

@@ -22,20 +22,21 @@ from backbone.blackboard.reader import BlackboardReader
 from backbone.blackboard.sealed_memory import Waits
 from backbone.blackboard.values import MOST_IN_PACKET
 from backbone.blackboard.writer import BlackboardWriter
+from backbone.operating_system import local_sockets
 
 
 @pytest.mark.parametrize("how", ["loop", "thread", "put"])
 async def test_without_descriptors_a_newcomer_waits_and_its_writer_does_not_spin(
     folder: Path, monkeypatch: pytest.MonkeyPatch, how: str
 ) -> None:
-    accept, refusals = sealed_memory.accept, list[int]()
+    accept, refusals = local_sockets.accept, list[int]()
 
     def refuse(_listening: socket.socket) -> socket.socket:
         refusals.append(1)
         raise OSError(errno.EMFILE, "no descriptors")
 
     monkeypatch.setattr(writers, "ACCEPT_AGAIN_S", 0.3)
-    monkeypatch.setattr(sealed_memory, "accept", refuse)
+    monkeypatch.setattr(local_sockets, "accept", refuse)
     writer = BlackboardWriter(folder, "room")
     thread = writer.serve_in_thread() if how == "thread" else None
     if how == "loop":
@@ -47,7 +48,7 @@ async def test_without_descriptors_a_newcomer_waits_and_its_writer_does_not_spin
             writer.put(b"first")
         await asyncio.sleep(0.05)
     assert 1 <= len(refusals) <= 1 + (time.monotonic() - began_s) / writers.ACCEPT_AGAIN_S
-    monkeypatch.setattr(sealed_memory, "accept", accept)
+    monkeypatch.setattr(local_sockets, "accept", accept)
     if how == "put":
         await asyncio.sleep(0.3)
         writer.put(b"first")
@@ -62,7 +63,7 @@ async def test_a_newcomer_is_admitted_although_the_timer_of_the_loop_is_early(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As those of uvloop, which count whole milliseconds: here the machine's clock does not go on at all."""
-    accept, refusals, now_s = sealed_memory.accept, list[int](), time.monotonic()
+    accept, refusals, now_s = local_sockets.accept, list[int](), time.monotonic()
 
     def refuse_once(listening: socket.socket) -> socket.socket:
         if not refusals:
@@ -72,7 +73,7 @@ async def test_a_newcomer_is_admitted_although_the_timer_of_the_loop_is_early(
 
     monkeypatch.setattr(writers, "ACCEPT_AGAIN_S", 0.05)
     monkeypatch.setattr(writers, "time", SimpleNamespace(monotonic=lambda: now_s))
-    monkeypatch.setattr(sealed_memory, "accept", refuse_once)
+    monkeypatch.setattr(local_sockets, "accept", refuse_once)
     writer = BlackboardWriter(folder, "room")
     writer.serve_in_loop()
     writer.put(b"first")
