@@ -13,6 +13,7 @@ from backbone.launcher.endings import ExitCode, say
 from backbone.recording.clock_offsets import ClockOffsets, Offset
 from backbone.recording.joining import join
 from backbone.spoken import counted
+from backbone.wire import plain
 
 
 async def join_to(paths: Sequence[Path], to: Path) -> ExitCode:
@@ -63,12 +64,7 @@ def _how_far(offset: Offset) -> str:
 def clocks_json(clocks: ClockOffsets) -> dict[str, dict[str, float | None]]:
     """Return the bounds of each clock except the reference's; None: no cause bounds it on that side."""
     return {
-        host: {
-            "at_least_s": finite(offset.at_least_s),
-            "at_most_s": finite(offset.at_most_s),
-            "taken_s": offset.taken_s,
-            "moved_s": offset.moved_s,
-        }
+        host: {name: finite(seconds) for name, seconds in plain(offset).items()}
         for host, offset in clocks.offsets.items()
     }
 

@@ -54,6 +54,7 @@ from backbone.recording.recorder import Recorder
 from backbone.recording.recovering import recover_file
 from backbone.recording.revival import Reviver
 from backbone.spoken import counted
+from backbone.wire import plain
 
 SHORTEST_RATED_S = 1.0  # chosen: two messages within a millisecond are no thousand a second
 VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
@@ -296,11 +297,8 @@ async def print_keys(path: Path, *, as_json: bool) -> ExitCode:
     with opened(path) as recording:
         found = recording.contents()
     lasted_s = found.end_s - found.begin_s
-    rows = [
-        {"key": one.key, "source": one.source, "schema": one.schema, "messages": one.messages} for one in found.counts
-    ]
     if as_json:
-        show(json.dumps(row) for row in rows)
+        show(json.dumps(plain(one)) for one in found.counts)
         return ExitCode.DONE
     show(
         f"{one.messages:8d} {_rate(one.messages, lasted_s)}  {one.key or 'several keys'}  {one.schema or 'no message'}"
