@@ -25,13 +25,7 @@ from backbone.component.log_level import LogLevel
 from backbone.errors import LinkError, Refusal, complaint
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
 from backbone.exchange_answers import ExchangeAnswers
-from backbone.exchange_course import (
-    ExchangeCourse,
-    ExchangePhase,
-    ExchangeRules,
-    class_path_of,
-    remark_on_file,
-)
+from backbone.exchange_course import ExchangeCourse, ExchangePhase, ExchangeRules, class_path_of, remark_on_file
 from backbone.launcher.messages import TakeBranch
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
@@ -39,13 +33,7 @@ from backbone.reading_anew import ReadAnew, read_anew
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message
 from mission_control.gated_bus import without_exit
-from mission_control.implementation import (
-    Implementation,
-    Load,
-    check_exchangeable,
-    handed_over,
-    made_beside,
-)
+from mission_control.implementation import Implementation, Load, check_exchangeable, handed_over, made_beside
 from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import AskBeat, Resumed, Suspended
 

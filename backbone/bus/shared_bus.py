@@ -19,16 +19,7 @@ from typing import Any, cast
 from backbone.bus.host_boards import boards_for
 from backbone.bus.host_copies import copies_for
 from backbone.bus.host_lines import lines_for
-from backbone.bus.interface import (
-    Answer,
-    Clock,
-    LifeListener,
-    Listener,
-    Overhearer,
-    Overhearing,
-    Reply,
-    Subscription,
-)
+from backbone.bus.interface import Answer, Clock, LifeListener, Listener, Overhearer, Overhearing, Reply, Subscription
 from backbone.bus.local_bus import LocalNetwork, Neighbor
 from backbone.bus.zenoh_bus import ZenohBus
 from backbone.bus.zenoh_far_copies import FarCopies

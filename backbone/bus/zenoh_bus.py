@@ -24,22 +24,8 @@ from backbone.bus.declared import Together
 from backbone.bus.host_boards import HostBoards
 from backbone.bus.host_copies import HostCopies, copies_for
 from backbone.bus.host_lines import lines_for
-from backbone.bus.inbox import (
-    EachSample,
-    LatestSample,
-    OverheardSamples,
-    bytes_of,
-    reader_of,
-)
-from backbone.bus.interface import (
-    Answer,
-    Clock,
-    Listener,
-    Overhearer,
-    Overhearing,
-    Reply,
-    Subscription,
-)
+from backbone.bus.inbox import EachSample, LatestSample, OverheardSamples, bytes_of, reader_of
+from backbone.bus.interface import Answer, Clock, Listener, Overhearer, Overhearing, Reply, Subscription
 from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, LosslessStreams
 from backbone.bus.near_listening import EachNear, NearListening
 from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
@@ -47,14 +33,7 @@ from backbone.bus.zenoh_life import LifeBus
 from backbone.bus.zenoh_links import Links
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
 from backbone.bus.zenoh_questions import Asked, DirectQuestion, Query, Ways, new_inbox, query
-from backbone.bus.zenoh_sessions import (
-    client_config,
-    close_session,
-    hub_config,
-    is_hub,
-    open_session,
-    open_when_up,
-)
+from backbone.bus.zenoh_sessions import client_config, close_session, hub_config, is_hub, open_session, open_when_up
 from backbone.bus.zenoh_subscribers import Subscribers
 from backbone.errors import Refusal
 from backbone.keys import Conversation, key, key_of_all, key_of_senders, sender_of

@@ -12,15 +12,7 @@ from backbone.command_line.unusable_file import FileUnusable, unreadable
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.recording.comparison import Difference, KeyComparison, Named, compared, pairs_in
-from backbone.recording.detection import (
-    DetectionRates,
-    Mark,
-    detected,
-    read_marks,
-    require_recorded,
-    sightings,
-    worse,
-)
+from backbone.recording.detection import DetectionRates, Mark, detected, read_marks, require_recorded, sightings, worse
 from backbone.spoken import counted
 
 LONGEST_VALUE = 60  # chosen: two of them fit a line of a wide terminal

@@ -19,15 +19,7 @@ from backbone.component.asking import ask_until_answered
 from backbone.component.messages import Absence, AskState, AskTime, ComponentState, MissionTime
 from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
-from backbone.exchange import (
-    NotExchanged,
-    Silent,
-    SwapClass,
-    SwapModule,
-    Swapped,
-    UnknownExchange,
-    UnknownModule,
-)
+from backbone.exchange import NotExchanged, Silent, SwapClass, SwapModule, Swapped, UnknownExchange, UnknownModule
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.operators import OperatorAction, publish_action

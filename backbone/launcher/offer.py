@@ -28,12 +28,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, AskState, AskTime, ComponentState, LifeState, LogLevel, MissionTime
-from backbone.creator.messages import (
-    ListProcesses,
-    Processes,
-    ProcessFell,
-    offer_name,
-)
+from backbone.creator.messages import ListProcesses, Processes, ProcessFell, offer_name
 from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.launcher.kept_creator import KeptCreator, Offered, recorder_of_host

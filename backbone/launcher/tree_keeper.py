@@ -39,15 +39,7 @@ from backbone.launcher.tree_changes import (
 from backbone.mission.behavior_orders import PLACE_PARAMETERS
 from backbone.mission.model import MissionDescription
 from backbone.naming import Subsystem, address, component_of
-from backbone.placer.messages import (
-    CreatorSilent,
-    Ended,
-    NotPlaced,
-    ReviseStart,
-    Start,
-    StartRevised,
-    StopComponent,
-)
+from backbone.placer.messages import CreatorSilent, Ended, NotPlaced, ReviseStart, Start, StartRevised, StopComponent
 from backbone.rc_manager.messages import AskAttributes, Done, SetPriority
 from backbone.scheduling.requests import UnknownRequest
 from backbone.scheduling.views import Attributes

@@ -18,16 +18,7 @@ from typing import IO, NamedTuple, cast
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import (
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    Message,
-    MessageIndex,
-    MetadataIndex,
-    Schema,
-    Statistics,
-)
+from mcap.records import AttachmentIndex, Channel, ChunkIndex, Message, MessageIndex, MetadataIndex, Schema, Statistics
 from mcap.stream_reader import MAGIC_SIZE, StreamReader
 from mcap.summary import Summary
 

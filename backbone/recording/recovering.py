@@ -25,14 +25,7 @@ from mcap.summary import Summary
 
 from backbone.recording.chunks import MOST_RECORD_BYTES
 from backbone.recording.file_index import IndexedReader, names_all
-from backbone.recording.reader import (
-    DAMAGED,
-    NOTHING_OF_ONE,
-    NoRecording,
-    NotOfMessages,
-    open_file,
-    wrong_begin,
-)
+from backbone.recording.reader import DAMAGED, NOTHING_OF_ONE, NoRecording, NotOfMessages, open_file, wrong_begin
 from backbone.recording.writer import PROFILE, begun_writer
 
 _OTHER_PROFILES = {"", "ros1", "ros2", "px4"}  # none, and the well-known ones of the MCAP specification

@@ -14,12 +14,7 @@ from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import creator_name
 from backbone.dependency_database.messages import Resource
 from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode, walk
-from backbone.mission.model import (
-    ComponentDescription,
-    CoreServiceDescription,
-    Host,
-    MissionDescription,
-)
+from backbone.mission.model import ComponentDescription, CoreServiceDescription, Host, MissionDescription
 from backbone.naming import Subsystem
 from mission_control.laboratory.simulation.shape import MISSION, POOL, POOL_TYPES, MissionShape, draw_shape
 
