@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from backbone.addresses import NAMESERVER
-from backbone.bus.interface import Bus, Clock
 from backbone.creator.messages import Spawned, StartFailed, creator_name
 from backbone.errors import LinkError, NoResponder
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
@@ -16,8 +15,6 @@ from backbone.placer.creators import ANSWER_EACH_S, SPAWN_WITHIN_S, Creators, Fa
 from backbone.placer.decisions import PlacementPhase, PlacementRecord
 from backbone.placer.exchanged_orders import as_declared
 from backbone.placer.messages import CreatorSilent, NoHost, Started, StoppedMeanwhile
-from backbone.placer.news import News
-from backbone.placer.placement_book import PlacementBook
 
 CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
 OLD_LIFE_S = 5.0  # chosen: longer than any lease that keeps tokens of a lost host's components
@@ -29,11 +26,7 @@ class BringUp:
 
     def __init__(
         self,
-        bus: Bus,
-        clock: Clock,
-        book: PlacementBook,
         creators: Creators,
-        news: News,
         *,
         note: Callable[[str, str], object],
         is_meeting: Callable[[], bool],
@@ -41,14 +34,12 @@ class BringUp:
         """Start components through these creators.
 
         Args:
-            bus: For questions to nameserver and creators.
-            book: All placements; the choice of hosts.
-            creators: Find the outcome of orders whose answer was lost.
-            news: Wakes waiting starts after each event.
+            creators: Find the outcome of orders whose answer was lost; know all placements.
             note: Subject, event → the story.
             is_meeting: True while the placer meets a creator, whose host may then be possible.
         """
-        self._bus, self._clock, self._book, self._creators, self._news = bus, clock, book, creators, news
+        self._creators, self._bus, self._clock = creators, creators.bus, creators.clock
+        self._book, self._news = creators.book, creators.news
         self._note, self._is_meeting = note, is_meeting
 
     async def bring_up(self, record: PlacementRecord) -> Started:

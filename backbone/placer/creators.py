@@ -46,10 +46,16 @@ class Fate(Enum):
 
 
 class Creators:
-    """Asks the creators of all hosts."""
+    """Asks the creators of all hosts.
+
+    Attributes:
+        bus: For questions to nameserver and creators.
+        book: All placements; the choice of hosts.
+        news: Wakes what waits, after each event.
+    """
 
     def __init__(self, bus: Bus, clock: Clock, book: PlacementBook, news: News) -> None:
-        self._bus, self._clock, self._book, self._news = bus, clock, book, news
+        self.bus, self.clock, self.book, self.news = bus, clock, book, news
 
     async def listed(self) -> Components:
         """Return the nameserver's list of creators.
@@ -69,12 +75,12 @@ class Creators:
 
     async def processes_on(self, host: str) -> Processes | None:
         """Return the list of the host's creator; None if it does not answer or is gone."""
-        until_s = self._clock.now_s() + ANSWER_WITHIN_S * self._clock.rate
-        while self._clock.now_s() < until_s and self._book.is_alive(host):
+        until_s = self.clock.now_s() + ANSWER_WITHIN_S * self.clock.rate
+        while self.clock.now_s() < until_s and self.book.is_alive(host):
             try:
-                return await self._bus.ask(creator_of(host), ListProcesses(), Processes, within_s=ANSWER_EACH_S)
+                return await self.bus.ask(creator_of(host), ListProcesses(), Processes, within_s=ANSWER_EACH_S)
             except LinkError:
-                await self._news.or_at(self._clock.now_s() + ANSWER_EACH_S / 5 * self._clock.rate)
+                await self.news.or_at(self.clock.now_s() + ANSWER_EACH_S / 5 * self.clock.rate)
         return None
 
     async def revise(self, host: str, spawn: Spawn) -> None:
@@ -102,13 +108,13 @@ class Creators:
         order = EndProcess(name, reason)
         within_s = order.ask_s + order.term_s + END_MARGIN_S
         try:
-            return (await self._bus.ask(creator_of(host), order, ProcessEnded, within_s=within_s)).by
+            return (await self.bus.ask(creator_of(host), order, ProcessEnded, within_s=within_s)).by
         except NotHere:
             return EndedBy.ITSELF
         except LinkError as error:
             processes = await self.processes_on(host)
             if processes is None:
-                gone = not self._book.is_alive(host)
+                gone = not self.book.is_alive(host)
             else:
                 gone = all(process.spawn.name != name for process in processes.processes)
             if gone:
@@ -128,10 +134,10 @@ class Creators:
         """
         by = await self.end(host, name, reason) if host else EndedBy.ITSELF
         silent: frozenset[str] = frozenset()
-        while (until_s := self._book.fences.until_s(name, self._clock.now_s())) is not None:
-            silent = self._book.fences.hosts(name)
-            await self._news.or_at(until_s)
-        for one in filter(self._book.is_alive, sorted(silent)):  # it was only cut off
+        while (until_s := self.book.fences.until_s(name, self.clock.now_s())) is not None:
+            silent = self.book.fences.hosts(name)
+            await self.news.or_at(until_s)
+        for one in filter(self.book.is_alive, sorted(silent)):  # it was only cut off
             by = await self.end(one, name, reason)
         return by
 
@@ -140,19 +146,19 @@ class Creators:
 
         If only the answer was lost, the component still becomes ready, and this method waits for it.
         """
-        until_s = self._clock.now_s() + SPAWN_WITHIN_S * self._clock.rate
+        until_s = self.clock.now_s() + SPAWN_WITHIN_S * self.clock.rate
         while True:
             answered = await self.processes_on(record.host)
             if answered is None:
-                return (Fate.UNKNOWN if self._book.is_alive(record.host) else Fate.HOST_LOST), 0
+                return (Fate.UNKNOWN if self.book.is_alive(record.host) else Fate.HOST_LOST), 0
             mine = [one for one in answered.processes if one.spawn.name == record.spawn.name]
             if not mine:
                 return Fate.NOT_DONE, 0
             if mine[0].pid and await self._is_ready(record.spawn.name):
                 return Fate.DONE, mine[0].pid
-            if self._clock.now_s() >= until_s:
+            if self.clock.now_s() >= until_s:
                 return Fate.UNKNOWN, 0
-            await self._news.or_at(min(until_s, self._clock.now_s() + ANSWER_EACH_S * self._clock.rate))
+            await self.news.or_at(min(until_s, self.clock.now_s() + ANSWER_EACH_S * self.clock.rate))
 
     async def _is_ready(self, name: str) -> bool:
         try:
@@ -163,7 +169,7 @@ class Creators:
 
     async def _ask(self, address: str, question: Message, reply: type[Reply]) -> Reply:
         return await ask_until_answered(
-            self._bus, self._clock, address, question, reply, each_s=ANSWER_EACH_S, within_s=ANSWER_WITHIN_S
+            self.bus, self.clock, address, question, reply, each_s=ANSWER_EACH_S, within_s=ANSWER_WITHIN_S
         )
 
 

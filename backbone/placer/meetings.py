@@ -6,7 +6,7 @@ from collections.abc import Callable, Coroutine
 from functools import partial
 
 from backbone.addresses import NAMESERVER
-from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.bus.interface import Subscription
 from backbone.component.messages import ComponentState, LifeState
 from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S, HostLoad, ProcessFell
 from backbone.errors import LinkError
@@ -15,8 +15,6 @@ from backbone.nameserver.messages import RECONNECT_S
 from backbone.naming import component_of
 from backbone.placer.creators import ANSWER_WITHIN_S, Creators, creator_of
 from backbone.placer.decisions import Inspect, Instruction
-from backbone.placer.news import News
-from backbone.placer.placement_book import PlacementBook
 from backbone.wire import Envelope
 
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED, LifeState.FAILED)
@@ -29,11 +27,7 @@ class Meetings:
 
     def __init__(
         self,
-        bus: Bus,
-        clock: Clock,
-        book: PlacementBook,
         creators: Creators,
-        news: News,
         *,
         own_host: str,
         remember: Callable[[str], None],
@@ -45,10 +39,7 @@ class Meetings:
         """Meet no creator yet.
 
         Args:
-            bus: For subscriptions and questions.
-            book: Hosts and placements.
-            creators: Lists the creators and their processes.
-            news: Gets the end of each meeting.
+            creators: Lists the creators and their processes; its ``news`` get the end of each meeting.
             own_host: Host of the placer: a creator there is never cut off.
             remember: Saves the name of another host that has a creator for the next placer.
             note: Subject, event → the story.
@@ -56,7 +47,8 @@ class Meetings:
             begin: Starts a task with a name.
             begin_later: Starts a task with a name, once the placer serves.
         """
-        self._bus, self._clock, self._book, self._creators, self._news = bus, clock, book, creators, news
+        self._creators, self._bus, self._clock = creators, creators.bus, creators.clock
+        self._book, self._news = creators.book, creators.news
         self._own_host, self._remember = own_host, remember
         self._note, self._carry_out = note, carry_out
         self._begin, self._begin_later = begin, begin_later

@@ -86,11 +86,7 @@ class Placer(Component[PlacerParameters]):
         self._happened = News(clock)
         self._creators = Creators(bus, clock, self._book, self._happened)
         self._meetings = Meetings(
-            bus,
-            clock,
-            self._book,
             self._creators,
-            self._happened,
             own_host=launch.host,
             remember=self._remember_host,
             note=self.story.note,
@@ -98,15 +94,7 @@ class Placer(Component[PlacerParameters]):
             begin=self._begin,
             begin_later=self._begin_later,
         )
-        self._start_up = BringUp(
-            bus,
-            clock,
-            self._book,
-            self._creators,
-            self._happened,
-            note=self.story.note,
-            is_meeting=self._meetings.are_under_way,
-        )
+        self._start_up = BringUp(self._creators, note=self.story.note, is_meeting=self._meetings.are_under_way)
         self._type_locks: dict[str, asyncio.Lock] = {}
         self._starts = self._refused = self._again = self._stops = self._orphans = 0
 
