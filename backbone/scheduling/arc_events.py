@@ -18,15 +18,13 @@ from collections.abc import Sequence
 import msgspec
 
 from backbone.scheduling.damping import Damping
-from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry, OpenDecision
+from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry
 from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
-from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.packet_times import PacketTimes
 from backbone.scheduling.preemption import understating
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import MeasuredPackets, RcUse, RequestState, SchedulingRequest
-from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.run_times import can_be_planned
 from backbone.scheduling.transitions import Transitions, because
 
@@ -43,23 +41,12 @@ class ArcEvents:
         understating: ARCs whose packets take longer than their requests state, by name.
     """
 
-    def __init__(
-        self,
-        decision: OpenDecision,
-        transitions: Transitions,
-        schedule: MasterSchedule,
-        tree: PriorityTree,
-        priorities: PriorityEvents,
-        rules: SchedulingRules,
-    ) -> None:
-        self._decision = decision
-        self._transitions = transitions
-        self._trace = transitions.trace
-        self._state = schedule.state
-        self._table = schedule.table
+    def __init__(self, transitions: Transitions, tree: PriorityTree, priorities: PriorityEvents) -> None:
+        self._decision, self._transitions, self._trace = transitions.decision, transitions, transitions.trace
+        self._state, self._table = transitions.schedule.state, transitions.schedule.table
         self._tree = tree
         self._priorities = priorities
-        self._grid_s = rules.grid_s
+        self._grid_s = transitions.rules.grid_s
         self._successors: dict[str, Requested] = {}
         self.retrying: dict[str, ArcEntry] = {}
         self._retries_s: dict[str, float] = {}

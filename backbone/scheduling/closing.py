@@ -9,13 +9,9 @@ import math
 from dataclasses import replace
 
 from backbone.scheduling.arc_events import ArcEvents
-from backbone.scheduling.entries import OpenDecision
 from backbone.scheduling.events import RevokeArc, WakeAt
-from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.priority import rank_of
 from backbone.scheduling.priority_events import PriorityEvents
-from backbone.scheduling.rules import SchedulingRules
-from backbone.scheduling.slice_ends import SliceExpiry
 from backbone.scheduling.transitions import Transitions
 
 
@@ -26,23 +22,12 @@ class Closing:
         wake_s: Mission time at which the caller must wake the manager; None: no time.
     """
 
-    def __init__(
-        self,
-        decision: OpenDecision,
-        transitions: Transitions,
-        schedule: MasterSchedule,
-        arcs: ArcEvents,
-        ends: SliceExpiry,
-        priorities: PriorityEvents,
-        rules: SchedulingRules,
-    ) -> None:
-        self._decision = decision
-        self._transitions = transitions
-        self._schedule = schedule
+    def __init__(self, transitions: Transitions, arcs: ArcEvents, priorities: PriorityEvents) -> None:
+        self._decision, self._transitions = transitions.decision, transitions
+        self._schedule, self._ends = transitions.schedule, transitions.ends
         self._arcs = arcs
-        self._ends = ends
         self._priorities = priorities
-        self._has_aging = rules.aging_s > 0
+        self._has_aging = transitions.rules.aging_s > 0
         self.wake_s: float | None = None
 
     def renew_slices(self) -> bool:

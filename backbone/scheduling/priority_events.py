@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from backbone.scheduling.entries import ArcEntry, OpenDecision
+from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.events import RenewLeases
-from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.preemption import overloading
 from backbone.scheduling.priority_tree import PriorityTree, carried
 from backbone.scheduling.requests import RequestState
-from backbone.scheduling.rules import ROUNDING, SchedulingRules
+from backbone.scheduling.rules import ROUNDING
 from backbone.scheduling.transitions import Transitions
 
 Place = tuple[str, ...]
@@ -20,21 +19,11 @@ Place = tuple[str, ...]
 class PriorityEvents:
     """Applies changes of the tree."""
 
-    def __init__(
-        self,
-        decision: OpenDecision,
-        transitions: Transitions,
-        schedule: MasterSchedule,
-        tree: PriorityTree,
-        rules: SchedulingRules,
-    ) -> None:
-        self._decision = decision
-        self._transitions = transitions
-        self._trace = transitions.trace
-        self._state = schedule.state
-        self._table = schedule.table
+    def __init__(self, transitions: Transitions, tree: PriorityTree) -> None:
+        self._decision, self._transitions, self._trace = transitions.decision, transitions, transitions.trace
+        self._state, self._table = transitions.schedule.state, transitions.schedule.table
         self._tree = tree
-        self._aging_s = rules.aging_s
+        self._aging_s = transitions.rules.aging_s
 
     def priority_changed(self, node: str, priority: int) -> None:
         """Set the number of a node or console."""

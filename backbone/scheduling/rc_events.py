@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from backbone.scheduling.entries import CONNECTED
 from backbone.scheduling.events import RcKnown
-from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.preemption import overloading
 from backbone.scheduling.transitions import Transitions
 
@@ -15,11 +14,9 @@ from backbone.scheduling.transitions import Transitions
 class RcEvents:
     """Applies events of RCs."""
 
-    def __init__(self, transitions: Transitions, schedule: MasterSchedule) -> None:
-        self._transitions = transitions
-        self._trace = transitions.trace
-        self._state = schedule.state
-        self._table = schedule.table
+    def __init__(self, transitions: Transitions) -> None:
+        self._transitions, self._trace = transitions, transitions.trace
+        self._state, self._table = transitions.schedule.state, transitions.schedule.table
 
     def known(self, event: RcKnown) -> None:
         """Add an RC, or apply the new state of a known one."""

@@ -102,11 +102,11 @@ class ScheduleManager:
         self._ends = ends = SliceExpiry(self._state)
         self._trace = TraceWriter(decision, goes_on=goes_on)
         self._transitions = Transitions(decision, schedule, ends, self._trace, rules, tolerance_s=tolerance_s)
-        self._priorities = PriorityEvents(decision, self._transitions, schedule, self.tree, rules)
-        self._arcs = ArcEvents(decision, self._transitions, schedule, self.tree, self._priorities, rules)
-        self._rcs = RcEvents(self._transitions, schedule)
-        self._switching = Switching(decision, self._transitions, schedule)
-        self._closing = Closing(decision, self._transitions, schedule, self._arcs, ends, self._priorities, rules)
+        self._priorities = PriorityEvents(self._transitions, self.tree)
+        self._arcs = ArcEvents(self._transitions, self.tree, self._priorities)
+        self._rcs = RcEvents(self._transitions)
+        self._switching = Switching(self._transitions)
+        self._closing = Closing(self._transitions, self._arcs, self._priorities)
 
     def begun_anew(self, rules: SchedulingRules, planner: PlannerType | None = None) -> ScheduleManager:
         """Return another manager with the same begin, but with these rules."""

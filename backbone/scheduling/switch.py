@@ -8,9 +8,8 @@ Rules of this file (numbers as in docs and ``why``):
 
 from __future__ import annotations
 
-from backbone.scheduling.entries import CONNECTED, ArcEntry, OpenDecision
+from backbone.scheduling.entries import CONNECTED, ArcEntry
 from backbone.scheduling.events import ConnectArc, RenewLeases
-from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.planner import Turn, in_order_of_revocation
 from backbone.scheduling.priority import higher
 from backbone.scheduling.requests import RequestState
@@ -20,11 +19,10 @@ from backbone.scheduling.transitions import Transitions
 class Switching:
     """Carries out turns: instructions to the loop, and state changes of the ARCs."""
 
-    def __init__(self, decision: OpenDecision, transitions: Transitions, schedule: MasterSchedule) -> None:
-        self._decision = decision
+    def __init__(self, transitions: Transitions) -> None:
+        self._decision, self._schedule = transitions.decision, transitions.schedule
         self._transitions = transitions
-        self._schedule = schedule
-        self._state = schedule.state
+        self._state = transitions.schedule.state
 
     def make_way(self, turn: Turn) -> None:
         """Revoke the holders that block the ARC whose turn it is; ended slices before preempted ones.

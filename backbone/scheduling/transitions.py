@@ -43,7 +43,11 @@ class Transitions:
     """Changes the states of ARCs, and adds lines and instructions to the decision.
 
     Attributes:
+        decision: The present decision.
+        schedule: The plans and the state.
+        ends: The ends of the slices.
         trace: Writes the lines.
+        rules: Rules of the decisions.
     """
 
     def __init__(
@@ -59,18 +63,10 @@ class Transitions:
         """Begin with nothing to carry out.
 
         Args:
-            decision: The present decision.
-            schedule: The plans and the state.
-            trace: Writes the lines.
-            rules: Rules of the decisions.
             tolerance_s: Reaction and timer tolerance of this run.
         """
-        self.trace = trace
-        self._decision = decision
-        self._schedule = schedule
+        self.decision, self.schedule, self.ends, self.trace, self.rules = decision, schedule, ends, trace, rules
         self._state = schedule.state
-        self._ends = ends
-        self._rules = rules
         self._tolerance_s = tolerance_s
         self._relaxed = False
         self._stamped = 0
@@ -83,22 +79,22 @@ class Transitions:
         arc.reservation = arc.retry_s = None
         arc.has_forced = False
         self.enter(arc, RequestState.WAITING)
-        if not self._relaxed and len(self._state.groups.of[arc].arcs) > self._schedule.planned_whole_up_to:
+        if not self._relaxed and len(self._state.groups.of[arc].arcs) > self.schedule.planned_whole_up_to:
             self._relaxed = True
             self.trace.record("meta", "a group is too big to be planned whole", **self._meta())
 
     def stamp(self) -> tuple[float, int]:
         """Return a new stamp, later than all given ones."""
         self._stamped += 1
-        return self._decision.now_s, self._stamped
+        return self.decision.now_s, self._stamped
 
     def enter(self, arc: ArcEntry, state: RequestState) -> None:
         """Let the ARC enter this state now, and check the ends of the slices for which it waits."""
-        self._state.enter(arc, state, self._decision.now_s)
+        self._state.enter(arc, state, self.decision.now_s)
         if state is RequestState.WAITING:
             for holder in [holder for rc in arc.uses for holder in self._state.rcs[rc].holders]:
                 if holder.state is RequestState.RUNNING:
-                    self._ends.wait_for(holder)
+                    self.ends.wait_for(holder)
 
     def rest(self, arc: ArcEntry) -> None:
         """Idle a waiting ARC."""
@@ -116,11 +112,11 @@ class Transitions:
 
     def grant(self, arc: ArcEntry) -> None:
         """Grant an ARC whose RCs have settled: its slice begins."""
-        arc.granted_s = arc.slice_s = self._decision.now_s
+        arc.granted_s = arc.slice_s = self.decision.now_s
         arc.has_forced = False
         arc.turns += 1
         self.enter(arc, RequestState.RUNNING)
-        self._ends.end_at(arc, self._slice_end_s(arc))
+        self.ends.end_at(arc, self._slice_end_s(arc))
         # On a sharable RC an ARC with a shorter settling time may overtake another. The overtaken epoch is only in the
         # line of its connection, so that the numbers of each RC grow in the trace.
         newest = {rc: epoch for rc, epoch in arc.epochs.items() if epoch > self._state.rcs[rc].granted_epoch}
@@ -140,37 +136,37 @@ class Transitions:
             entry.epoch = max(entry.epoch, epoch)
             entry.granted_epoch = max(entry.granted_epoch, epoch)
         arc.turns = 1
-        arc.began_s, arc.granted_s, arc.slice_s = self._decision.now_s, granted_s, granted_s
+        arc.began_s, arc.granted_s, arc.slice_s = self.decision.now_s, granted_s, granted_s
         self.enter(arc, RequestState.RUNNING)
-        self._ends.end_at(arc, granted_s + arc.minimum_s)
+        self.ends.end_at(arc, granted_s + arc.minimum_s)
 
     def renew(self, arc: ArcEntry) -> None:
         """Begin a new slice of a served ARC that stays when an equal's slice ended; its place is behind its equals."""
         arc.stamp = self.stamp()
-        arc.slice_s = self._decision.now_s
+        arc.slice_s = self.decision.now_s
         arc.turns += 1
-        self._ends.end_at(arc, self._slice_end_s(arc))
+        self.ends.end_at(arc, self._slice_end_s(arc))
         self.trace.record("slice", "it stays where an equal's slice ended (rule 5)", arc=arc.name)
         self._record_grid(arc)
 
     def extend(self, arc: ArcEntry, until_s: float) -> None:
         """Extend the slice of a running ARC."""
-        self._ends.end_at(arc, until_s)
+        self.ends.end_at(arc, until_s)
         self.trace.record("extend", "it asked to go on (rule 14)", arc=arc.name, until=until_s)
 
     # The ARC loses its RCs.
 
     def revoke(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
         """Revoke all RCs of a connected ARC."""
-        deadline_s = self._rules.grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
+        deadline_s = self.rules.grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
         self.lose(arc, why, by, afterwards)
         revoked = RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, NOT_EXPECTED_S)
-        self._decision.instructions.append(revoked)
+        self.decision.instructions.append(revoked)
 
     def lose(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
         """Count the ARC's RCs as being disconnected; the next place of a served ARC is behind its equals."""
         cause = because(why, by)
-        if arc.served(self._decision.now_s):
+        if arc.served(self.decision.now_s):
             arc.stamp = self.stamp()
         arc.swapped_out, arc.swapped_out_by = why, by
         self._count_way(arc)
@@ -180,7 +176,7 @@ class Transitions:
 
     def _count_way(self, arc: ArcEntry) -> None:
         """Count how often the ARC was revoked before its slice was over for the same wait of a higher one."""
-        if arc.served(self._decision.now_s):
+        if arc.served(self.decision.now_s):
             arc.made_way = 0
         elif arc.swapped_out == "higher":
             wait = arc.swapped_out_by, self._state.arcs[arc.swapped_out_by].stamp
@@ -192,25 +188,25 @@ class Transitions:
         self.enter(arc, state)
 
     def _slice_end_s(self, arc: ArcEntry) -> float:
-        return self._rules.slice_end_s(self._decision.now_s, arc.minimum_s)
+        return self.rules.slice_end_s(self.decision.now_s, arc.minimum_s)
 
     def _record_grid(self, arc: ArcEntry) -> None:
-        if self._rules.grid_s:
+        if self.rules.grid_s:
             self.trace.record("extend", "slices end on a common grid (rule 15)", arc=arc.name, until=arc.end_s)
 
     # The rules in the trace.
 
     def opening_line(self) -> Record:
         """Return the line that begins a section of the trace."""
-        return Record({"ev": "meta", "t": self._decision.now_s, **self._meta()})
+        return Record({"ev": "meta", "t": self.decision.now_s, **self._meta()})
 
     def _meta(self) -> dict[str, object]:
         return {
             "v": VERSION,
-            "mode": self._rules.policy,
-            "discipline": self._rules.discipline,
+            "mode": self.rules.policy,
+            "discipline": self.rules.discipline,
             "wc": "relaxed" if self._relaxed else "plan",
-            "grace": self._rules.grace_s,
+            "grace": self.rules.grace_s,
             "tol": self._tolerance_s,
         }
 

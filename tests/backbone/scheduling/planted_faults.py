@@ -33,13 +33,13 @@ FAULTS = [
     Planted(
         "an aborted slice costs its place",
         "transitions.py",
-        "        if arc.served(self._decision.now_s):\n            arc.stamp = self.stamp()\n        arc.swapped_out",
+        "        if arc.served(self.decision.now_s):\n            arc.stamp = self.stamp()\n        arc.swapped_out",
         "        arc.stamp = self.stamp()\n        arc.swapped_out",
     ),
     Planted(
         "a served ARC keeps its place",
         "transitions.py",
-        "        if arc.served(self._decision.now_s):\n            arc.stamp = self.stamp()\n        arc.swapped_out",
+        "        if arc.served(self.decision.now_s):\n            arc.stamp = self.stamp()\n        arc.swapped_out",
         "        arc.swapped_out",
     ),
     Planted("an epoch is given twice", "switch.py", "rcs[rc].epoch += 1", "rcs[rc].epoch += 0"),
