@@ -29,7 +29,7 @@ from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import AskRequest, CloseGate, Done, GateClosed, GateOpens, Leases, OpenGate, TakePath
+from backbone.rc_manager.messages import AskRequest, CloseGate, GateClosed, GateOpens, Leases, OpenGate
 from backbone.scheduling.requests import Usage
 from backbone.scheduling.run_times import require_runtime
 from backbone.waiting import set_within
@@ -75,7 +75,7 @@ class AggregateResourceController(Component[ArcParameters]):
     """Base class of every ARC; derive, set ``roles``, ``commands`` and ``body``, override ``prepare``."""
 
     parameters_type = ArcParameters
-    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
+    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | ArcQuestion
     roles: ClassVar[Mapping[str, str] | Sequence[str]] = ()
     """Role → kind of RC in its set; a sequence of kinds if each role is named like its kind."""
     commands: ClassVar[Mapping[type[Command], str | Sequence[str]]] = {}
@@ -183,7 +183,7 @@ class AggregateResourceController(Component[ArcParameters]):
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Carry out orders of the RC manager for the gate, and orders of the owner for everything else."""
         match asked.body:
-            case OpenGate() | CloseGate() | AskRequest() | TakePath() if asked.source != RC_MANAGER:
+            case OpenGate() | CloseGate() | AskRequest() if asked.source != RC_MANAGER:
                 raise NotFromYou(f"{self.name} does not take {type(asked.body).__name__} from {asked.source}")
             case OpenGate() as order:
                 return await self._open(order)
@@ -193,9 +193,6 @@ class AggregateResourceController(Component[ArcParameters]):
                 current = self._placed.current(self.epochs, self._gate.granted_s, self._slice.extended_until_s)
                 self._manager_watch.asks()
                 return current
-            case TakePath(path=path):
-                self._placed.take_path(path)
-                return Done()
             case AskArc():
                 return self._arc_state()
             case _ if asked.source != self._owner:

@@ -13,7 +13,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.errors import LinkError, Refusal
 from backbone.rc_manager.messages import ChangeRuntime, CurrentRequest, Done, SetIdle, Withdraw
-from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.scheduling.requests import Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.run_times import require_runtime
 from backbone.wire import Message
 from resource_pool.arc_request import set_of
@@ -117,12 +117,6 @@ class PlacedRequest:
             await self._bus.ask(RC_MANAGER, Withdraw(self._arc, "self"), Done, within_s=RC_REPLY_S)
         except (LinkError, Refusal) as error:
             log.info("not withdrawn: %s", error)
-
-    def take_path(self, path: list[PathNode]) -> None:
-        """Use this priority path from now on."""
-        if self.request is not None:
-            self.request = msgspec.structs.replace(self.request, path=path)
-        self._changed({"path": [(node.name, node.priority) for node in path]})
 
     def current(self, epochs: Mapping[str, int], granted_s: float, extended_until_s: float) -> CurrentRequest:
         """Return the request, its holds and its extended slice, for the recovery of a restarted RC manager.

@@ -100,7 +100,9 @@ class Spawned(Message, frozen=True):
 
 
 class ReviseSpawn(Message, frozen=True):
-    """Start the component with these parameters from its next start on. Only the placer asks this.
+    """Start the component with these parameters from its next start on.
+
+    Only the placer asks this, and the RC manager about itself.
 
     Attributes:
         parameters: All of them; the running process keeps its own.

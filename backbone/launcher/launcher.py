@@ -13,13 +13,21 @@ from typing import ClassVar
 
 import msgspec
 
-from backbone.addresses import NAMESERVER
+from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.authentication import SECRET_NAME
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, ComponentState, LifeState, LogLevel
-from backbone.creator.messages import READY_WITHIN_S, ListProcesses, Processes, ProcessFell
+from backbone.creator.messages import (
+    READY_WITHIN_S,
+    ListProcesses,
+    NotThePlacer,
+    Processes,
+    ProcessFell,
+    ReviseSpawn,
+    SpawnRevised,
+)
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError
 from backbone.launcher.awaited_hosts import announce_awaited_hosts, awaited_hosts
@@ -65,7 +73,7 @@ class Launcher(Component[NoParameters]):
 
     drains_within_s = None
     accepts: ClassVar[Accepts | None] = (
-        ListProcesses | AskLog | AskPeople | AskDeclared | AskTree | TreeChange | EndingQuestion
+        ListProcesses | ReviseSpawn | AskLog | AskPeople | AskDeclared | AskTree | TreeChange | EndingQuestion
     )
 
     def __init__(
@@ -191,10 +199,18 @@ class Launcher(Component[NoParameters]):
         self.end(signal.SIGINT.name)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``ListProcesses`` for the core services, and questions about log, people, orders, tree and end."""
+        """Answer ``ListProcesses`` for the core services, and questions about log, people, orders, tree and end.
+
+        The RC manager has its next process started with the numbers and places that operators have set.
+        """
         match asked.body:
             case ListProcesses():
                 return Processes(self.launch.host, [], self._keeper.processes())
+            case ReviseSpawn() as revised:
+                if (asked.source, revised.name) != (RC_MANAGER, component_of(RC_MANAGER)):
+                    raise NotThePlacer(f"{self.name} does not take {revised.name}'s parameters from {asked.source}")
+                self._keeper.revise(revised)
+                return SpawnRevised()
             case AskLog() as wanted:
                 return self._log.log.answer(wanted)
             case AskPeople():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
 from collections import defaultdict
@@ -12,7 +11,6 @@ from typing import Protocol
 
 import msgspec
 
-from backbone.component.asking import ask_until_answered
 from backbone.component.messages import Absence
 from backbone.errors import LinkError, Refusal
 from backbone.rc_manager.arc_switches import ArcSwitches
@@ -24,26 +22,22 @@ from backbone.rc_manager.messages import (
     Beat,
     ChangeRuntime,
     CurrentRequest,
-    Done,
     Extend,
     NotThatArc,
     SetIdle,
-    TakePath,
     Withdraw,
 )
 from backbone.rc_manager.rc_watch import Service
 from backbone.rc_manager.recovery import Recovery
 from backbone.scheduling.events import Departed
 from backbone.scheduling.explain.answers import Answers
-from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest
+from backbone.scheduling.requests import Scheduled, SchedulingRequest
 from backbone.scheduling.run_times import can_be_planned
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
 OF_AN_ARC = (SchedulingRequest, Withdraw, SetIdle, ChangeRuntime, Extend)
-ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; without an answer it hangs or is gone
-PATH_WITHIN_S = 60.0  # chosen: longer than links are down; an ARC that is silent so long is forgotten before
 
 
 @dataclass(slots=True, eq=False)
@@ -82,7 +76,6 @@ class ArcWatch:
         self._beats = Beats(service.clock.rate)
         self._requesting: defaultdict[str, list[Choosing]] = defaultdict(list)
         self._meeting: set[str] = set()
-        self._telling: dict[str, asyncio.Task[None]] = {}
 
     def require_sender(self, asked: Envelope[Message]) -> None:
         """Check that a request of an ARC, or a change of it, comes from this ARC.
@@ -151,8 +144,6 @@ class ArcWatch:
         """Know the ARC and its requests no longer, and expect no beats; return whether a request was admitted."""
         for choosing in self._requesting.get(arc, ()):
             choosing.request = None
-        if (telling := self._telling.pop(arc, None)) is not None:
-            telling.cancel()
         self._failures.forget(arc)
         self._switches.forget(arc)
         return self._beats.forget(arc)
@@ -194,16 +185,3 @@ class ArcWatch:
             await self._service.request(current.request)  # its own request was lost, or is still on its way
         except (Refusal, LinkError) as error:
             self._service.story.note(arc, f"got no place in the schedule: {error}")
-
-    def tell_path(self, arc: str, path: list[PathNode]) -> None:
-        """Send an ARC its present path until it answers, because a later RC manager must receive it from the ARC."""
-        if (earlier := self._telling.get(arc)) is not None:
-            earlier.cancel()
-        self._telling[arc] = self._service.start_task(self._tell_path(arc, path), f"path of {arc}")
-
-    async def _tell_path(self, arc: str, path: list[PathNode]) -> None:
-        bus, clock, order = self._service.bus, self._service.clock, TakePath(path)
-        try:
-            await ask_until_answered(bus, clock, in_pool(arc), order, Done, each_s=ARC_REPLY_S, within_s=PATH_WITHIN_S)
-        except (Refusal, LinkError) as error:
-            self._service.story.note(arc, f"did not accept its new path; the next RC manager would not get it: {error}")

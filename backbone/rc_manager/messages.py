@@ -3,7 +3,7 @@
 Senders and receivers:
 
 * ARC → RC manager: ``SchedulingRequest``, ``Withdraw``, ``SetIdle``, ``ChangeRuntime``, ``Extend``.
-* RC manager → ARC: ``OpenGate``, ``CloseGate``, ``AskRequest``, ``TakePath``.
+* RC manager → ARC: ``OpenGate``, ``CloseGate``, ``AskRequest``.
 * RC manager → RC: ``Connect``, ``Disconnect``, ``AskRc``; ``Leases`` as a publication.
 * any component → RC manager: ``AskSchedule``, ``AskWhy``, ``AskAttributes``, ``AskUtilization``, ``SetPriority``,
   ``MoveNode``.
@@ -32,7 +32,7 @@ from backbone.ranges import (
     Values,
 )
 from backbone.scheduling.events import Event
-from backbone.scheduling.requests import Holder, Lease, MeasuredPackets, PathNode, RcUse, SchedulingRequest
+from backbone.scheduling.requests import Holder, Lease, MeasuredPackets, RcUse, SchedulingRequest
 from backbone.wire import Message
 
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
@@ -142,12 +142,6 @@ class GateClosed(Message, frozen=True):
 
 class AskRequest(Message, frozen=True):
     """A restarted RC manager asks an ARC for its request and its holds."""
-
-
-class TakePath(Message, frozen=True):
-    """An operator changed the priority or place of the ARC's owner: its requests have this path from now on."""
-
-    path: Annotated[list[PathNode], FEW]
 
 
 class CurrentRequest(Message, frozen=True):

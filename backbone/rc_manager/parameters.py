@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from backbone.scheduling.events import KeptTree
 from backbone.scheduling.rules import SchedulingRules
 
 
@@ -12,11 +13,13 @@ class RcManagerParameters(SchedulingRules, frozen=True, forbid_unknown_fields=Tr
         mission: Name of the mission's own node, root of the behavior tree.
         mission_priority: Its priority among the consoles.
         trace: File of the decisions; empty: none.
+        tree: The numbers and places that operators set at an earlier RC manager of this mission.
     """
 
     mission: str
     mission_priority: int = 0
     trace: str = ""
+    tree: KeptTree = KeptTree()
 
     def rules(self) -> SchedulingRules:
         """Return only the scheduling rules."""

@@ -11,7 +11,6 @@ Source: RAM 2002, "The RC Scheduler".
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from pathlib import Path
 from typing import assert_never
 
@@ -25,6 +24,7 @@ from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.arc_switches import ArcSwitches
 from backbone.rc_manager.arc_watch import ArcWatch
+from backbone.rc_manager.changed_tree import ChangedTree
 from backbone.rc_manager.context_switch import ContextSwitch
 from backbone.rc_manager.decision_log import DecisionLog
 from backbone.rc_manager.failures import Failures
@@ -61,6 +61,7 @@ from backbone.scheduling.events import (
     Extended,
     Idled,
     Instruction,
+    KeptTree,
     NodeMoved,
     PacketsMeasured,
     PriorityChanged,
@@ -77,7 +78,7 @@ from backbone.scheduling.events import (
 )
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.requests import LEASE_S, Lease, RequestState, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.scheduling.requests import LEASE_S, Lease, RequestState, Scheduled, SchedulingRequest
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.views import Utilization
 from backbone.waiting import end_tasks, set_within
@@ -117,6 +118,7 @@ class RcManager(Component[RcManagerParameters]):
         self._arcs = ArcWatch(self, failures, self._switches, self._recovery)
         self._hardware = Hardware(self, self._recovery, self._rcs)
         self._resources = self._hardware.resources
+        self._changed_tree = ChangedTree(self)
         self._found = Found({}, {})
         self._lines_published = 0
 
@@ -177,11 +179,11 @@ class RcManager(Component[RcManagerParameters]):
                 self.happened(Extended(arc, until_s))
             case SetPriority(node=node, priority=priority):
                 self.happened(PriorityChanged(node, priority))
-                self._tell_paths(node)
+                self._changed_tree.keep()
             case MoveNode(node=node, parent=parent):
                 self.manager.require_movable(node, parent)
                 self.happened(NodeMoved(node, parent))
-                self._tell_paths(node)
+                self._changed_tree.keep()
             case AskSchedule():
                 return self.answers.schedule(self.clock.now_s())
             case AskWhy(name=name):
@@ -215,12 +217,6 @@ class RcManager(Component[RcManagerParameters]):
         """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
         return self._arcs.is_choosing()
 
-    def _tell_paths(self, node: str) -> None:
-        """Send the ARCs of the node and its descendants their present paths."""
-        with contextlib.suppress(UnknownRequest):  # the node has no request yet
-            for one in self.answers.attributes(node).requests:
-                self._arcs.tell_path(one.arc, one.path)
-
     def admit_again(self, current: CurrentRequest) -> bool:
         """Admit a request with the RCs chosen for it before, unless one is gone or they are no alternative."""
         if is_right := has_its_rcs(current, self._resources):
@@ -230,11 +226,6 @@ class RcManager(Component[RcManagerParameters]):
     def _admit(self, request: SchedulingRequest, rcs: tuple[str, ...], *, others_follow: bool = False) -> None:
         self._arcs.remember(request.arc)
         self.happened(Requested(request, rcs, others_follow))
-        arc = self.manager.master_schedule.state.arcs.get(request.arc)
-        if arc is not None and arc.request.path == request.path:  # else its last request is still being ended
-            path = self.manager.tree.nodes(arc.place_in_tree)
-            if path[-len(request.path) :] != request.path:  # an operator has changed it, and the ARC began anew since
-                self._arcs.tell_path(request.arc, path)
 
     def happened(self, event: Event, at_s: float | None = None) -> None:
         """Let the schedule manager decide on the event, at ``at_s`` or now, and begin to carry out its instructions."""
@@ -276,6 +267,8 @@ class RcManager(Component[RcManagerParameters]):
         adopted = found.adopted(self._resources, self.clock.now_s())
         began_s = min((at_s for at_s, _ in adopted), default=self.clock.now_s())
         self._rcs.up.update(found.rcs)
+        if self.parameters.tree != KeptTree():
+            self.happened(self.parameters.tree, began_s)
         for resource in self._resources.values():
             self.shares.know(resource.name, began_s)
             self.happened(rc_known(resource, found.rcs.get(resource.name)), began_s)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from backbone.ranges import FEW, MANY, Duration, Epoch, Instant, Mention, Priority, RunTime, Share, Text
-from backbone.scheduling.requests import MeasuredPackets, RcUse, SchedulingRequest
+from backbone.scheduling.requests import MeasuredPackets, PathNode, RcUse, SchedulingRequest
 from backbone.scheduling.trace import Line
 from backbone.wire import Message
 
@@ -155,6 +155,32 @@ class NodeMoved(Message, frozen=True):
     parent: Mention
 
 
+class Moved(Message, frozen=True):
+    """A node that was moved.
+
+    Attributes:
+        before: Names from the root to its former place.
+        now: Names from the root to its new place.
+    """
+
+    before: Annotated[list[Mention], FEW]
+    now: Annotated[list[Mention], FEW]
+
+
+class KeptTree(Message, frozen=True):
+    """Operators set these numbers and places at an earlier RC manager; the first event of a later one.
+
+    Attributes:
+        priorities: Node or console → its number.
+        moves: The moves, in their order.
+        nodes: Path of each node, if nodes were moved: a moved node can be named before the nodes above it.
+    """
+
+    priorities: Annotated[dict[Mention, Priority], MANY] = {}
+    moves: Annotated[list[Moved], MANY] = []
+    nodes: Annotated[list[Annotated[list[PathNode], FEW]], MANY] = []
+
+
 class Opened(Message, frozen=True):
     """The ARC's RCs are connected and settled, its gate is open."""
 
@@ -198,6 +224,7 @@ Event = (
     | Extended
     | PriorityChanged
     | NodeMoved
+    | KeptTree
     | Opened
     | OpenFailed
     | Freed

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from backbone.scheduling.events import KeptTree, Moved
 from backbone.scheduling.priority import CONSOLE, Path
 from backbone.scheduling.requests import PathNode
 
@@ -104,6 +105,20 @@ class PriorityTree:
         for names in self._numbers:
             if names[-1].removeprefix(CONSOLE) == node:
                 self._numbers[names] = priority
+
+    def kept(self) -> KeptTree:
+        """Return the numbers and places that operators have set."""
+        moves = [Moved([*old], [*new]) for old, new in self._moves]
+        ways = [way for way in self._numbers if moves and not way[0].startswith(CONSOLE)]
+        return KeptTree(dict(self._set), moves, [self.nodes(way) for way in ways])
+
+    def restore(self, kept: KeptTree) -> None:
+        """Set the numbers and places that operators set at an earlier RC manager, before any request."""
+        self._moves = [(tuple(move.before), tuple(move.now)) for move in kept.moves]
+        for path in kept.nodes:
+            self._numbers[tuple(node.name for node in path)] = path[-1].priority
+        for node, priority in kept.priorities.items():
+            self.change(node, priority)
 
     def obstacle(self, node: str, parent: str) -> str:
         """Return why the node of this name cannot be moved below the other one; empty if it can."""

@@ -24,6 +24,7 @@ from backbone.scheduling.events import (
     Freed,
     Idled,
     Instruction,
+    KeptTree,
     NodeMoved,
     Opened,
     OpenFailed,
@@ -199,6 +200,8 @@ class ScheduleManager:
                 self._priorities.priority_changed(node, priority)
             case NodeMoved(node=node, parent=parent):
                 self._priorities.node_moved(node, parent)
+            case KeptTree():
+                self.tree.restore(event)
             case Opened(arc=arc):
                 self._arcs.opened(arc)
             case OpenFailed(arc=arc, rc=rc):

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import AskRequest, CloseGate, OpenGate, TakePath
+from backbone.rc_manager.messages import AskRequest, CloseGate, OpenGate
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arcs.video_drive import VideoDriveArc
 from resource_pool.commands import SwitchTransmitter, Tune
@@ -24,7 +24,7 @@ class CaptureArc(VideoDriveArc):
     receiver: ClassVar[str] = "framegrabber"
     """Role of the RC that receives and delivers pictures."""
     gives_pictures = True
-    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
+    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | ArcQuestion | NothingHeard
 
     @classmethod
     def cameras(cls) -> Mapping[str, tuple[str, str]]:

@@ -16,6 +16,7 @@ from backbone.bus.interface import Bus
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.creator.messages import ReviseSpawn, SpawnRevised
 from backbone.dependency_database.messages import Resource
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.naming import Subsystem, address
@@ -196,6 +197,9 @@ class Owner(Component[Any]):
         pass
 
 
+MANAGER_OWNER = "backbone/manager_owner"
+
+
 @dataclass
 class Pool:
     """A running pool. Components are started, ended and killed by name."""
@@ -208,6 +212,7 @@ class Pool:
     running: dict[str, Component[Any]] = field(default_factory=dict)
     lives: dict[str, asyncio.Task[None]] = field(default_factory=dict)
     voices: dict[str, Bus] = field(default_factory=dict)
+    kept_tree: dict[str, Any] = field(default_factory=dict)
 
     @property
     def radio_driver(self) -> WiretappedRadio:
@@ -224,11 +229,11 @@ class Pool:
         parameters: dict[str, Any] | None = None,
         subsystem: Subsystem = Subsystem.RESOURCE_POOL,
         kind: str = "",
+        requester: str = "",
     ) -> C:
         """Return the component when it is ready."""
-        launch = Launch(
-            self.network.mission, subsystem, name, kind or name, "x:Y", "local", "", 0.0, 1.0, parameters or {}
-        )
+        mission, given = self.network.mission, parameters or {}
+        launch = Launch(mission, subsystem, name, kind or name, "x:Y", "local", "", 0.0, 1.0, given, requester)
         made = component(launch, self.network.join(launch.address, self.clock), self.clock)
         ready = asyncio.Event()
         watching = made.bus.watch_alive(launch.address, lambda _address, alive: ready.set() if alive else None)
@@ -249,8 +254,16 @@ class Pool:
         return await self.start(self.rc_classes[resource.type], name, parameters, kind=resource.type)
 
     async def manager(self, **rules: Any) -> RcManager:
-        parameters = {"mission": "local", "mission_priority": 10} | rules
-        return await self.start(RcManager, "rc_manager", parameters, Subsystem.BACKBONE)
+        """Start the RC manager as the launcher does: with the tree that the one before sent."""
+        if MANAGER_OWNER not in self.voices:
+            self.voice_of(MANAGER_OWNER).serve(MANAGER_OWNER, ReviseSpawn, self._keep_tree)
+        parameters = {"mission": "local", "mission_priority": 10} | self.kept_tree | rules
+        return await self.start(RcManager, "rc_manager", parameters, Subsystem.BACKBONE, requester=MANAGER_OWNER)
+
+    async def _keep_tree(self, asked: Envelope[Message]) -> Message:
+        assert isinstance(asked.body, ReviseSpawn)
+        self.kept_tree = {"tree": asked.body.parameters["tree"]}
+        return SpawnRevised()
 
     async def owner(self, name: str) -> Owner:
         return await self.start(Owner, name, None, Subsystem.MISSION_CONTROL)

@@ -25,7 +25,6 @@ from backbone.rc_manager.messages import (
     OpenGate,
     RcState,
     SetPriority,
-    TakePath,
 )
 from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
 from backbone.wire import Envelope, Message, Reader, write
@@ -83,7 +82,7 @@ def hostile_message(shape: SupervisedShape, target: str, number: int) -> Hostile
             Leases([], time_s),
         ]
     else:
-        bodies = [OpenGate({rc: count}, time_s, dice.choice(TIMES)), TakePath([PathNode(owner, count)])]
+        bodies = [OpenGate({rc: count}, time_s, dice.choice(TIMES))]
     body = dice.choice(bodies)
     if isinstance(body, Leases):
         return HostileMessage(RC_MANAGER, RC_MANAGER, Conversation.LEASES, body)

@@ -199,10 +199,10 @@ class Pool:
         self.rcs[resource.name] = rc
         return rc
 
-    def manager(self, host: str = "here") -> RcManager:
-        parameters = {"mission": "local", "mission_priority": 10, "trace": str(self.trace)}
+    def manager(self, host: str = "here", requester: str = "", **more: Any) -> RcManager:
+        parameters = {"mission": "local", "mission_priority": 10, "trace": str(self.trace)} | more
         launch = self.launch(Subsystem.BACKBONE, "rc_manager", "rc_manager", parameters)
-        launch = msgspec.structs.replace(launch, host=host)
+        launch = msgspec.structs.replace(launch, host=host, requester=requester)
         return RcManager(launch, self.network.join(launch.address, self.clock), self.clock)
 
 

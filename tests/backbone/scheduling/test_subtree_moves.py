@@ -10,10 +10,11 @@ import pytest
 from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import convert, to_builtins
 from random_missions import play, random_mission
 from simulated_switches import MISSION, Bench, ask, manager, unit
 
-from backbone.scheduling.events import NodeMoved, PriorityChanged
+from backbone.scheduling.events import KeptTree, NodeMoved, PriorityChanged
 from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import NotMovable, PathNode, UnknownRequest
@@ -43,10 +44,17 @@ class PlainTree:
         return tuple((name, self.number[name]) for name in self.way(node))
 
 
+def restored(tree: PriorityTree) -> PriorityTree:
+    """Return the tree of the next RC manager."""
+    later = PriorityTree("m", 0)
+    later.restore(convert(to_builtins(tree.kept()), KeptTree))
+    return later
+
+
 @settings(max_examples=share(200))
 @given(seeds)
 def test_after_any_moves_everybody_stands_where_a_plain_tree_has_them(seed):
-    """However often requests repeat the ways their owners were started with."""
+    """However often requests repeat the ways their owners were started with, and whenever the RC manager restarts."""
     rng = Random(seed)
     plain = PlainTree(rng)
     tree = PriorityTree("m", 0)
@@ -65,8 +73,10 @@ def test_after_any_moves_everybody_stands_where_a_plain_tree_has_them(seed):
             again = rng.choice(sorted(plain.number))
             plain.number[again] = rng.randint(0, 2)
             tree.change(again, plain.number[again])
-        told = rng.choice(sorted(plain.number))  # its ARC is told its place, and names that from now on
-        asked[told] = plain.nodes(told)
+        if rng.random() < 0.3:
+            tree = restored(tree)
+            for one in rng.sample(sorted(asked), len(asked)):
+                tree.place(asked[one], console=False)
         for one in rng.sample(sorted(asked), 3):
             names, _ = tree.place(asked[one], console=False)
             assert list(names) == plain.way(one)
