@@ -12,7 +12,7 @@ from functools import partial
 import msgspec
 
 from mission_control.laboratory.harness import results_of
-from mission_control.laboratory.simulation.faults import Fault, Hang, KillFault, MessageFault
+from mission_control.laboratory.simulation.faults import Fault
 from mission_control.laboratory.simulation.laws import Broken, story_of
 from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
 from mission_control.laboratory.simulation.shrink import smallest
@@ -200,9 +200,7 @@ def _run_quietly(seed: int, supervised: bool, chaos: bool, faults: Sequence[AnyF
         if supervised:
             struck = None if faults is None else [each for each in faults if isinstance(each, SupervisionFault)]
             return run_supervised(seed, chaos=chaos, faults=struck)
-        said = (
-            None if faults is None else [each for each in faults if isinstance(each, MessageFault | KillFault | Hang)]
-        )
+        said = None if faults is None else [each for each in faults if not isinstance(each, SupervisionFault)]
         return run_mission(seed, chaos=chaos, faults=said)
     finally:
         logging.root.removeHandler(drop)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Literal
 
+from mission_control.laboratory.simulation.operator_choices import OperatorChange, OtherRules
 from mission_control.laboratory.simulation.shape import BRING_UP_S, MissionShape
 
 Effect = Literal["lost", "late", "doubled"]
@@ -74,7 +75,8 @@ class Hang:
         return f"{self.target} is cut off at {self.at_s:.3f} s for {self.lasts_s:.3f} s"
 
 
-Fault = MessageFault | KillFault | Hang
+Moment = KillFault | Hang | OtherRules | OperatorChange
+Fault = MessageFault | Moment
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,17 +15,19 @@ The laws, by name:
 manager decides otherwise.
 * progress: without further faults, each owner that wants time and has no rival of higher priority gets it (not under
 the policy ``strict``).
+* obeyed: a priority that the RC manager confirmed to an operator holds, also over restarts (not with aging).
 * no-bug: no component ends by a bug.
 
 Events of the audit: ``begins killed ends fails`` of components; ``held``, ``let go``, ``safe``, ``unsafe`` of RCs;
 ``open shut`` of ARCs; ``resumed suspended claims releases wants applied refused`` of decision processes; ``packet`` of
-radios; the trace's events of the RC manager; ``calm`` and ``over`` of the mission.
+radios; the trace's events of the RC manager; ``changed unconfirmed`` of the operator; ``calm`` and ``over`` of the
+mission.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 
 from backbone.scheduling.priority import higher
@@ -33,6 +35,7 @@ from backbone.scheduling.requests import LEASE_S
 from mission_control.laboratory.simulation.audit import Happening
 from mission_control.laboratory.simulation.faults import LONGEST_DELAY_S, LONGEST_HANG_S
 from mission_control.laboratory.simulation.shape import MissionShape
+from mission_control.laboratory.simulation.traced_tree import TracedTree
 
 SAFE, FREED = "S", "freed"
 FREED_WITHIN_S = 0.5  # chosen: an RC ends its holds one after the other, each within 0.4 s, before it connects the next
@@ -72,16 +75,18 @@ def first_broken(
     *,
     all_arrived: bool = False,
     longest_s: float = 0.0,
-    others: Sequence[Path] = (),
+    others: Mapping[str, Path] = {},
+    ages: bool = False,
 ) -> Broken | None:
     """Return the first broken law, or None if all hold.
 
     Args:
         all_arrived: True if no message was lost, late or doubled.
         longest_s: Additional time for which beliefs may be wrong, because processes were paused or cut off.
-        others: Paths of decision processes besides the owners; they always want time.
+        others: ARC → path of its decision process, for those besides the owners; they always want time.
+        ages: True if waiting ARCs rise, so that numbers change.
     """
-    judge = _Judge(shape, all_arrived, longest_s, others)
+    judge = _Judge(shape, all_arrived, longest_s, others, ages)
     for happening in happenings:
         for broken in judge.judge(happening):
             return broken
@@ -118,8 +123,11 @@ class _Belief:
 
 
 class _Judge:
-    def __init__(self, shape: MissionShape, all_arrived: bool, longest_s: float, others: Sequence[Path]) -> None:
+    def __init__(
+        self, shape: MissionShape, all_arrived: bool, longest_s: float, others: Mapping[str, Path], ages: bool
+    ) -> None:
         self._shape, self._all_arrived, self._longest_s, self._others = shape, all_arrived, longest_s, others
+        self._ages = ages
         self._struck_s = -math.inf
         self._to_keep: set[tuple[str, str, int]] = set()
         self._keep_until_s = -math.inf
@@ -140,10 +148,12 @@ class _Judge:
         self._calm_s: float | None = None
         self._wanting: dict[str, float] = {}
         self._granted: dict[str, float] = {}
+        self._tree = TracedTree()
 
     def judge(self, h: Happening) -> Iterator[Broken]:
         """Record an event and yield each law that it violates."""
         yield from self._overdue(h.at_s)
+        self._tree.hear(h, self._longest_s)
         match h.what:
             case "held":
                 yield from self._held(h, h.values["arc"], h.values["epoch"])
@@ -186,6 +196,7 @@ class _Judge:
                 self._calm_s = h.at_s
             case "over":
                 yield from self._progress(h.at_s)
+                yield from self._obedience(h.at_s)
         self._compare(h.at_s)
 
     def _held(self, h: Happening, arc: str, epoch: int) -> Iterator[Broken]:
@@ -325,9 +336,11 @@ class _Judge:
             return  # this policy leaves RCs idle for ARCs that may not start yet
         wanting = [owner for owner in self._shape.owners if owner.name in self._wanting]
         for owner in wanting:
-            paths = [*(other.path for other in wanting if other is not owner), *self._others]
+            paths = [self._path(other.arc, other.path) for other in wanting if other is not owner]
+            paths += [self._path(arc, path) for arc, path in self._others.items()]
+            own = self._path(owner.arc, owner.path)
             if (
-                any(higher(path, owner.path) for path in paths)
+                any(higher(path, own) for path in paths)
                 or self._granted.get(owner.name, -1.0) >= self._wanting[owner.name]
             ):
                 continue
@@ -336,3 +349,12 @@ class _Judge:
             since_s = self._wanting[owner.name]
             what = f"{owner.name} has wanted time since {since_s:.4f} s, got none, and has no higher rival"
             yield Broken("progress", now_s, what, (owner.name, owner.arc))
+
+    def _path(self, arc: str, path: Path) -> Path:
+        """Return the present path of an ARC whose owner began with this one; an operator may have changed it."""
+        return self._tree.path(arc) or path
+
+    def _obedience(self, now_s: float) -> Iterator[Broken]:
+        for node, number, wanted, at_s in () if self._ages else self._tree.disobeyed():
+            what = f"{node} has the priority {number}, although an operator set {wanted} at {at_s:.4f} s"
+            yield Broken("obeyed", now_s, what, (node, "operator", RC_MANAGER))

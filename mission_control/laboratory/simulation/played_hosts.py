@@ -34,6 +34,7 @@ class PlayedRole:
     Attributes:
         component: Its class, or a factory.
         is_restarted: True if its creator restarts it after a crash.
+        requester: Address of its owner; empty: it has none.
     """
 
     component: Callable[[Launch, Bus, Clock], AnyComponent]
@@ -42,6 +43,7 @@ class PlayedRole:
     kind: str
     parameters: Mapping[str, object]
     is_restarted: bool = True
+    requester: str = ""
 
 
 @dataclass
@@ -101,6 +103,11 @@ class PlayedHosts:
         life = self._lives.get(name)
         return life.component if life is not None else None
 
+    def revise(self, name: str, parameters: Mapping[str, object]) -> None:
+        """Start the component of this name with these parameters from its next start on."""
+        life = self._lives[name]
+        life.role = replace(life.role, parameters=parameters)
+
     def kill(self, name: str, away_s: float) -> None:
         """End the component as SIGKILL does; a restart follows after ``away_s``, if at all."""
         life = self._lives.get(name)
@@ -155,7 +162,17 @@ class PlayedHosts:
         """Run the component once, to its end."""
         role = life.role
         launch = Launch(
-            self._network.mission, role.subsystem, role.name, role.kind, "", HOST, "", 0.0, 1.0, dict(role.parameters)
+            self._network.mission,
+            role.subsystem,
+            role.name,
+            role.kind,
+            "",
+            HOST,
+            "",
+            0.0,
+            1.0,
+            dict(role.parameters),
+            role.requester,
         )
         bus = self._network.join(launch.address, self._clock)
         try:

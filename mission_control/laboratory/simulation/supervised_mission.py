@@ -28,6 +28,7 @@ from mission_control.laboratory.simulation.hostile_numbers import hostile_messag
 from mission_control.laboratory.simulation.laws import first_broken
 from mission_control.laboratory.simulation.liveness import RUNS_AGAIN_S, Watcher, first_unhealed
 from mission_control.laboratory.simulation.mission_run import MissionRun
+from mission_control.laboratory.simulation.operator_choices import OPERATOR, OperatorChange, OtherRules, carry_out
 from mission_control.laboratory.simulation.shape import MISSION
 from mission_control.laboratory.simulation.simulated_links import LinkedNetwork
 from mission_control.laboratory.simulation.simulated_machines import Machines, SimulatedZygote, current_machines
@@ -88,7 +89,9 @@ class _SupervisedMission:
         self._shape, self._faults = shape, faults
         self._audit, self._clock = Audit(), VirtualClock()
         self._calm_s = max(shape.pool.active_s, storm_over_s(faults))
+        self._rules = next((fault for fault in faults if isinstance(fault, OtherRules)), OtherRules())
         self._waiting_ends: dict[str, End] = {}
+        self._operator: SimulatedProcess | None = None
         self._saying: list[asyncio.Task[None]] = []
 
     async def run(self) -> MissionRun:
@@ -112,6 +115,7 @@ class _SupervisedMission:
             happenings,
             longest_s=RUNS_AGAIN_S + max((fault.over_s - fault.at_s for fault in self._faults), default=0.0),
             others=self._shape.tree_paths(),
+            ages=self._rules.aging_s > 0,
         )
         return MissionRun(pool, tuple(self._faults), happenings, self._audit.digest(), broken)
 
@@ -167,7 +171,7 @@ class _SupervisedMission:
             bus,
             self._clock,
             keeper=keeper,
-            description=self._shape.description(),
+            description=self._shape.description(self._rules.parameters()),
             options=UpOptions(),
             observer=_Observer(),
             began_s=0.0,
@@ -209,6 +213,11 @@ class _SupervisedMission:
     def _strike(self, fault: SupervisionFault) -> None:
         self._audit.note("mission", "fault", fault=str(fault))
         match fault:
+            case OtherRules():  # in force since the bring-up
+                return
+            case OperatorChange():
+                self._change(fault)
+                return
             case Starve(target=host, gap_s=gap_s):
                 self._machines.starve(host, fault.over_s, gap_s)
                 return
@@ -242,6 +251,13 @@ class _SupervisedMission:
         stranger = self._machines.begin("stranger", self._shape.hosts[0])
         saying = say_hostile(message, self._network.join, self._clock, self._audit)
         self._saying.append(asyncio.get_running_loop().create_task(saying, context=stranger.context))
+
+    def _change(self, change: OperatorChange) -> None:
+        if self._operator is None:
+            self._operator = self._machines.begin("operator", self._shape.hosts[0])
+        bus = self._operator.run(self._network.join, OPERATOR, self._clock)
+        work = carry_out(change, bus, self._audit)
+        self._saying.append(asyncio.get_running_loop().create_task(work, context=self._operator.context))
 
     def _go_on(self, process: SimulatedProcess) -> None:
         if not process.is_dead:

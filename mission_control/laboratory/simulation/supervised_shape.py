@@ -5,6 +5,7 @@ Pure: the same seed gives the same mission, in every process and on every machin
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from random import Random
 
@@ -16,6 +17,7 @@ from backbone.dependency_database.messages import Resource
 from backbone.mission.behavior_nodes import ArcNeed, BehaviorNode, walk
 from backbone.mission.model import ComponentDescription, CoreServiceDescription, Host, MissionDescription
 from backbone.naming import Subsystem
+from backbone.scheduling.priority import Path
 from mission_control.laboratory.simulation.shape import MISSION, POOL, POOL_TYPES, MissionShape, draw_shape
 
 CORE = ("component_database", "placer", "creator", "dependency_database", "rc_manager")
@@ -66,23 +68,27 @@ class SupervisedShape:
             [node.name for node in self.nodes],
         ]
 
-    def tree_paths(self) -> list[tuple[tuple[str, int], ...]]:
-        """Return the priority path of each node that claims an ARC."""
+    def tree_paths(self) -> dict[str, Path]:
+        """Return the ARC of each node that claims one, with the node's priority path."""
         root = (MISSION, self.pool.priority)
-        return [
-            (root, (tree.name, tree.priority), (leaf.name, leaf.priority))
+        return {
+            arc_of(leaf): (root, (tree.name, tree.priority), (leaf.name, leaf.priority))
             for tree in self.trees
             for leaf in tree.children
             if leaf.arc is not None
-        ]
+        }
 
     def hearers(self) -> list[str]:
         """Return the targets of hostile messages: the RC manager, RCs and ARCs."""
         _, _, rcs, arcs, _, _ = self.groups()
         return ["rc_manager", *rcs, *arcs]
 
-    def description(self) -> MissionDescription:
-        """Return the mission as a description, as from a mission file."""
+    def description(self, rules: Mapping[str, object]) -> MissionDescription:
+        """Return the mission as a description, as from a mission file.
+
+        Args:
+            rules: Further parameters of the RC manager.
+        """
         core = Subsystem.BACKBONE
         types = [ComponentType(name, path, core, core=True) for name, path in CLASSES.items()]
         types += POOL_TYPES
@@ -93,7 +99,8 @@ class SupervisedShape:
         for name in CORE:
             where = self.hosts if name == "creator" else self.hosts[:1]
             services += [
-                CoreServiceDescription(type=name, host=host, parameters=self._core_parameters(name)) for host in where
+                CoreServiceDescription(type=name, host=host, parameters=self._core_parameters(name, rules))
+                for host in where
             ]
         owners = [
             ComponentDescription(
@@ -117,8 +124,8 @@ class SupervisedShape:
             source="a seed",
         )
 
-    def _core_parameters(self, service: str) -> dict[str, object]:
-        return {"grace_s": self.pool.grace_s, "policy": self.pool.policy} if service == "rc_manager" else {}
+    def _core_parameters(self, service: str, rules: Mapping[str, object]) -> dict[str, object]:
+        return {"grace_s": self.pool.grace_s, "policy": self.pool.policy, **rules} if service == "rc_manager" else {}
 
 
 def arc_of(node: BehaviorNode) -> str:

@@ -11,6 +11,11 @@ from dataclasses import dataclass
 from random import Random
 from typing import Literal
 
+from mission_control.laboratory.simulation.operator_choices import (
+    OperatorChange,
+    OtherRules,
+    draw_choices,
+)
 from mission_control.laboratory.simulation.shape import BRING_UP_S
 from mission_control.laboratory.simulation.supervised_shape import SupervisedShape
 
@@ -116,13 +121,14 @@ class Hostile(_Sudden):
         return f"{self.target} hears hostile message {self.number} at {self.at_s:.3f} s"
 
 
-SupervisionFault = Pause | End | Cut | Starve | Hostile
+SupervisionFault = Pause | End | Cut | Starve | Hostile | OtherRules | OperatorChange
 
 
 def draw_supervision_faults(shape: SupervisedShape) -> list[SupervisionFault]:
-    """Return the faults of this mission, in order of time."""
+    """Return the faults of this mission and its operators' choices, in order of time."""
     dice = Random(f"supervision {shape.seed}")
-    found = [_draw(dice, shape) for _ in range(dice.randint(1, MOST_FAULTS))]
+    found: list[SupervisionFault] = [*draw_choices(shape.pool, shape.groups()[-1])]
+    found += [_draw(dice, shape) for _ in range(dice.randint(1, MOST_FAULTS))]
     return sorted(found, key=lambda fault: (fault.at_s, fault.target))
 
 

@@ -141,6 +141,42 @@ def test_who_wants_and_never_gets_breaks_progress_unless_somebody_is_above_it() 
     assert judged(calm, *wants, *run, over) is None
 
 
+def numbered(at_s: float, name: str, number: int) -> Entry:
+    return (at_s, "rc_manager", "node", {"id": f"simulated/{name}", "parent": "simulated", "prio": number})
+
+
+def asked(at_s: float, name: str) -> Entry:
+    return (at_s, "rc_manager", "request", {"arc": f"{name}-drive", "owner": f"simulated/{name}"})
+
+
+ROOT: Entry = (1, "rc_manager", "node", {"id": "simulated", "parent": None, "prio": 10})
+
+
+def test_a_confirmed_priority_that_does_not_hold_breaks_obeyed() -> None:
+    done: Entry = (2, "operator", "changed", {"target": "a", "value": 7})
+    over: Entry = (30, "mission", "over", {})
+    began: list[Entry] = [ROOT, numbered(1, "a", 2), asked(1, "a"), done]
+    again: list[Entry] = [(9, "rc_manager", "begins", {}), (9, *ROOT[1:]), numbered(9, "a", 2), asked(9, "a")]
+    assert broken_law(*began, over) == "obeyed"
+    assert judged(*began, numbered(2, "a", 7), over) is None
+    assert broken_law(*began, *again, over) == "obeyed"
+    assert judged(*began, *again, (10, "rc_manager", "depart", {"arc": "a-drive"}), over) is None
+    assert judged(*began, (3, "operator", "unconfirmed", {"target": "a", "value": 7}), over) is None
+    soon: Entry = (7.9, "operator", "changed", {"target": "a", "value": 7})
+    assert judged(*began[:-1], soon, *again, over) is None, "the launcher may not have it yet"
+
+
+def test_progress_is_judged_by_the_priorities_that_an_operator_set() -> None:
+    """``a`` began as the higher one."""
+    calm: Entry = (10, "mission", "calm", {})
+    over: Entry = (30, "mission", "over", {})
+    tree = [ROOT, numbered(1, "a", 2), numbered(1, "b", 1), asked(1, "a"), asked(1, "b")]
+    wants: list[Entry] = [(10, name, "wants", {"arc": f"{name}-drive"}) for name in "ab"]
+    found = judged(*tree, numbered(2, "b", 3), calm, *wants, over)
+    assert found is not None
+    assert (found.law, found.names) == ("progress", ("b", "b-drive"))
+
+
 @pytest.mark.parametrize(
     ("what", "values", "law"), [("fails", {"error": "x"}, "no-bug"), ("promise broken", {"promise": "x"}, "schedule")]
 )

@@ -13,6 +13,7 @@ from backbone.errors import Refusal
 from backbone.wire import Envelope, Reader, write
 from mission_control.laboratory.simulation.hostile_numbers import hostile_message
 from mission_control.laboratory.simulation.mission_run import MissionRun
+from mission_control.laboratory.simulation.operator_choices import OperatorChange
 from mission_control.laboratory.simulation.supervised_mission import run_supervised
 from mission_control.laboratory.simulation.supervised_shape import draw_supervised_shape
 from mission_control.laboratory.simulation.supervision_faults import (
@@ -75,6 +76,20 @@ def test_a_host_that_was_cut_off_is_whole_again() -> None:
     assert any(happening.what == "degraded" and "h2" in str(happening) for happening in run.happenings)
 
 
+def test_a_priority_that_an_operator_set_outlives_the_rc_manager() -> None:
+    """Also if the console's ARC begins anew, and nothing else of the mission knows the number."""
+    seed = next(seed for seed in range(20) if any(owner.console for owner in draw_supervised_shape(seed).pool.owners))
+    console = next(owner for owner in draw_supervised_shape(seed).pool.owners if owner.console)
+    run = run_lawfully(
+        seed,
+        OperatorChange(AT_S, console.name, 3),
+        End(AT_S + 7.0, "rc_manager", "killed"),
+        End(AT_S + 7.0, console.arc, "killed"),
+    )
+    asked = [one for one in run.happenings if one.what == "request" and one.values["arc"] == console.arc]
+    assert asked[-1].values["owner"] == {"ui": 3, "id": console.name}
+
+
 def test_supervised_missions_suffer_everything() -> None:
     """Laws are easily kept where nothing happens."""
     faults = [fault for seed in range(100) for fault in draw_supervision_faults(draw_supervised_shape(seed))]
@@ -88,6 +103,10 @@ def test_supervised_missions_suffer_everything() -> None:
         "the link of h2",
         "starved",
         "hostile",
+        "the priority",
+        "the parent",
+        "the capacity",
+        "admission",
     ):
         assert word in words, word
     lasting = [fault.lasts_s for fault in faults if isinstance(fault, Pause)]
