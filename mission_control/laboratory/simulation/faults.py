@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Literal
 
-from mission_control.laboratory.simulation.operator_choices import OperatorChange, OtherRules
+from mission_control.laboratory.simulation.operator_choices import OperatorChange, OtherRules, RobotStop
 from mission_control.laboratory.simulation.shape import BRING_UP_S, MissionShape
 
 Effect = Literal["lost", "late", "doubled"]
@@ -75,7 +75,7 @@ class Hang:
         return f"{self.target} is cut off at {self.at_s:.3f} s for {self.lasts_s:.3f} s"
 
 
-Moment = KillFault | Hang | OtherRules | OperatorChange
+Moment = KillFault | Hang | OtherRules | OperatorChange | RobotStop
 Fault = MessageFault | Moment
 
 

@@ -7,6 +7,8 @@ The laws, by name:
 * fenced: after a command under an epoch, the robot gets no packet of an older epoch; after the connection of the next
   ARC it gets only the safe packet; and no packet is sent outside its ARC's hold of the radio.
 * freed: when the RC manager records an ARC's RCs as free, the ARC holds no running RC.
+* stopped: after an operator's stop no packet moves the robot until its lift is ordered; if the stop is not confirmed,
+  after twice ``COMMAND_TIMEOUT_S``.
 * safe: the last packet to a robot from an ARC and a radio is the safe packet.
 * whole-set: a gate opens only when all its RCs were connected to its ARC under exactly these epochs.
 * true: an owner's belief agrees with its ARC's gate, and the gate agrees with the RCs, except for known delays.
@@ -20,8 +22,8 @@ The laws, by name:
 
 Events of the audit: ``begins killed ends fails`` of components; ``held``, ``let go``, ``safe``, ``unsafe`` of RCs;
 ``open shut`` of ARCs; ``resumed suspended claims releases wants applied refused`` of decision processes; ``packet`` of
-radios; the trace's events of the RC manager; ``changed unconfirmed`` of the operator; ``calm`` and ``over`` of the
-mission.
+radios; the trace's events of the RC manager; ``changed unconfirmed stops lifts`` of the operator; ``calm`` and ``over``
+of the mission.
 """
 
 from __future__ import annotations
@@ -36,8 +38,10 @@ from mission_control.laboratory.simulation.audit import Happening
 from mission_control.laboratory.simulation.faults import LONGEST_DELAY_S, LONGEST_HANG_S
 from mission_control.laboratory.simulation.shape import MissionShape
 from mission_control.laboratory.simulation.traced_tree import TracedTree
+from resource_pool.messages import COMMAND_TIMEOUT_S
 
 SAFE, FREED = "S", "freed"
+MOVING = frozenset("DJ")  # ``scout_model.radio_link``: drive and jump
 FREED_WITHIN_S = 0.5  # chosen: an RC ends its holds one after the other, each within 0.4 s, before it connects the next
 RECOVERY_S = 6.0  # chosen: a lease, a late message, and the time to claim a lost ARC again
 SOON_BACK_S = 0.6  # chosen: including its questions to all components, it renews before any lease expires
@@ -149,6 +153,7 @@ class _Judge:
         self._wanting: dict[str, float] = {}
         self._granted: dict[str, float] = {}
         self._tree = TracedTree()
+        self._stands_from_s: dict[str, float] = {}
 
     def judge(self, h: Happening) -> Iterator[Broken]:
         """Record an event and yield each law that it violates."""
@@ -163,6 +168,11 @@ class _Judge:
                 yield from self._safe(h, h.values["arc"])
             case "packet":
                 yield from self._packet(h)
+            case "stops":
+                motion_s = 0.0 if h.values["is_confirmed"] else 2 * COMMAND_TIMEOUT_S
+                self._stands_from_s.setdefault(h.values["robot"], h.at_s + motion_s)
+            case "lifts":
+                self._stands_from_s.pop(h.values["robot"], None)
             case "free":
                 self._free.add(h.values["arc"])
                 self._must_be_free(h, self._holds.keys() - self._down)
@@ -252,6 +262,9 @@ class _Judge:
             what = f"{h.who} sends {command!r} of {arc} to {scout} under epoch {epoch}, which is at {newest}"
             yield Broken("fenced", h.at_s, what, (h.who, arc, scout))
         sent = self._sent.get(h.who, {}).get(arc)
+        if command in MOVING and h.at_s > self._stands_from_s.get(scout, math.inf):
+            what = f"{h.who} sends {command!r} of {arc} to {scout}, which an operator has stopped"
+            yield Broken("stopped", h.at_s, what, (h.who, arc, scout, "operator"))
         if sent is None or sent.is_over:
             what = f"{h.who} sends {command!r} to {scout} for {arc}, which does not hold it"
             yield Broken("fenced", h.at_s, what, (h.who, arc, scout))

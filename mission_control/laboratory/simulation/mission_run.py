@@ -7,6 +7,7 @@ Source: FoundationDB tests a whole distributed system in one process on virtual 
 from __future__ import annotations
 
 import asyncio
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -44,8 +45,11 @@ from mission_control.laboratory.simulation.operator_choices import (
     OPERATOR,
     OperatorChange,
     OtherRules,
+    RobotStop,
     carry_out,
     draw_choices,
+    draw_stops,
+    stop_and_lift,
 )
 from mission_control.laboratory.simulation.played_hosts import PlayedHosts, PlayedRole
 from mission_control.laboratory.simulation.shape import BRING_UP_S, MISSION, POOL_TYPES, RCS, MissionShape, draw_shape
@@ -91,7 +95,7 @@ def run_mission(seed: int, *, chaos: bool, faults: Sequence[Fault] | None = None
 
 def _draw_moments(shape: MissionShape, weather: Weather) -> list[Moment]:
     nodes = [owner.name for owner in shape.owners if not owner.console]
-    moments = [*draw_choices(shape, nodes), *draw_moments(shape, weather)]
+    moments = [*draw_choices(shape, nodes), *draw_stops(shape), *draw_moments(shape, weather)]
     return sorted(moments, key=lambda moment: (moment.at_s, moment.target))
 
 
@@ -109,6 +113,17 @@ class _PoolMission:
 
     async def run(self) -> MissionRun:
         current_audit.set(self._audit)
+        with tempfile.TemporaryDirectory() as folder:
+            self._hosts.run_directory = folder
+            await self._live()
+        faults = (*self._network.suffered, *self._moments)
+        happenings = tuple(self._audit.happenings)
+        broken = first_broken(
+            self._shape, happenings, all_arrived=not self._network.suffered, ages=self._rules.aging_s > 0
+        )
+        return MissionRun(self._shape, faults, happenings, self._audit.digest(), broken)
+
+    async def _live(self) -> None:
         try:
             await self._bring_up()
             for fault in self._moments:
@@ -121,12 +136,6 @@ class _PoolMission:
         finally:
             await end_tasks(*self._changes)
             await self._hosts.stop_all()
-        faults = (*self._network.suffered, *self._moments)
-        happenings = tuple(self._audit.happenings)
-        broken = first_broken(
-            self._shape, happenings, all_arrived=not self._network.suffered, ages=self._rules.aging_s > 0
-        )
-        return MissionRun(self._shape, faults, happenings, self._audit.digest(), broken)
 
     def _strike(self, fault: Moment) -> None:
         match fault:
@@ -137,6 +146,9 @@ class _PoolMission:
                 self._network.cut_off(self._address(target), self._clock.now_s() + lasts_s)
             case OperatorChange():
                 work = carry_out(fault, self._operator, self._audit)
+                self._changes.append(asyncio.create_task(work, name="operator"))
+            case RobotStop():
+                work = stop_and_lift(fault, self._operator, self._clock, self._audit)
                 self._changes.append(asyncio.create_task(work, name="operator"))
             case OtherRules():
                 pass  # in force since the bring-up

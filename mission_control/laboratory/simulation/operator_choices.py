@@ -1,4 +1,4 @@
-"""Choices of operators: other rules of the RC manager, and changes of a mission that is up. Pure, except ``carry_out``.
+"""Choices of operators: other rules of the RC manager, changes of a mission that is up, and emergency stops.
 
 They are among the faults of a mission, because a mission must keep its laws with them, and because a broken run is
 repeated with some of them. The id of a choice is its time and target.
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from random import Random
 
 from backbone.addresses import RC_MANAGER
-from backbone.bus.interface import Bus
+from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import SetParameter
 from backbone.errors import LinkError, Refusal
 from backbone.naming import Subsystem, address, component_of
@@ -20,6 +20,7 @@ from backbone.scheduling.response_time import Analysis
 from backbone.wire import Message
 from mission_control.laboratory.simulation.audit import Audit
 from mission_control.laboratory.simulation.shape import BRING_UP_S, MISSION, MissionShape
+from resource_pool.robot_stops import lift_stop, stop_robot
 
 OPERATOR = "ui_console/operator"
 WITHIN_S = 1.0  # chosen: every component answers at once, if at all
@@ -100,6 +101,27 @@ class OperatorChange:
         return f"an operator gives {self.target} {what} at {self.at_s:.3f} s"
 
 
+@dataclass(frozen=True, slots=True)
+class RobotStop:
+    """An emergency stop of a robot, which is lifted after a while.
+
+    Attributes:
+        target: The robot's RC.
+    """
+
+    at_s: float
+    target: str
+    lasts_s: float
+
+    @property
+    def over_s(self) -> float:
+        """Mission time of its end."""
+        return self.at_s + self.lasts_s
+
+    def __str__(self) -> str:
+        return f"an operator stops {self.target} at {self.at_s:.3f} s for {self.lasts_s:.3f} s"
+
+
 def draw_choices(shape: MissionShape, nodes: Sequence[str]) -> list[OtherRules | OperatorChange]:
     """Return the choices for this mission; half of the missions have other rules, half of them changes.
 
@@ -124,6 +146,43 @@ def _draw(dice: Random, shape: MissionShape, nodes: Sequence[str]) -> OperatorCh
             return OperatorChange(at_s, dice.choice(radios), dice.choice(CAPACITIES))
         case _:
             return OperatorChange(at_s, dice.choice((*consoles, *nodes)), dice.choice(PRIORITIES))
+
+
+def draw_stops(shape: MissionShape) -> list[RobotStop]:
+    """Return the emergency stops of this mission, at most two; half of the missions have none."""
+    dice = Random(f"stops {shape.seed}")
+    robots = [resource.name for resource in shape.resources if resource.type == "scout"]
+    number = dice.choice((0, 0, 1, 2))
+    return [
+        RobotStop(
+            round(dice.uniform(BRING_UP_S, shape.active_s), 6), dice.choice(robots), round(dice.uniform(0.1, 6.0), 3)
+        )
+        for _ in range(number)
+    ]
+
+
+async def stop_and_lift(stop: RobotStop, bus: Bus, clock: Clock, audit: Audit) -> None:
+    """Stop the robot; if it has confirmed the order, lift the stop later, until that is confirmed."""
+    robot = stop.target
+    try:
+        state = await stop_robot(bus, robot, "simulated", clock=clock)
+    except LinkError:
+        audit.note("operator", "stop unconfirmed", robot=robot)
+        return
+    audit.note("operator", "stops", robot=robot, is_confirmed=state.is_confirmed)
+    await clock.sleep_s(stop.lasts_s)
+    audit.note("operator", "lifts", robot=robot)
+    while True:
+        try:
+            await lift_stop(bus, state)
+        except LinkError:
+            await clock.sleep_s(WITHIN_S)
+        except Refusal as newer:
+            audit.note("operator", "not lifted", robot=robot, how=type(newer).__name__)
+            return
+        else:
+            audit.note("operator", "lifted", robot=robot)
+            return
 
 
 async def carry_out(change: OperatorChange, bus: Bus, audit: Audit) -> None:

@@ -56,9 +56,14 @@ class _Life:
 
 
 class PlayedHosts:
-    """All hosts of a mission, in this process."""
+    """All hosts of a mission, in this process.
+
+    Attributes:
+        run_directory: Folder of the mission's files; empty: there is none.
+    """
 
     def __init__(self, network: LocalNetwork, clock: Clock, audit: Audit) -> None:
+        self.run_directory = ""
         self._network, self._clock, self._audit = network, clock, audit
         self._lives: dict[str, _Life] = {}
         self._watching: dict[str, asyncio.Task[None]] = {}
@@ -173,6 +178,7 @@ class PlayedHosts:
             1.0,
             dict(role.parameters),
             role.requester,
+            self.run_directory,
         )
         bus = self._network.join(launch.address, self._clock)
         try:

@@ -28,7 +28,14 @@ from mission_control.laboratory.simulation.hostile_numbers import hostile_messag
 from mission_control.laboratory.simulation.laws import first_broken
 from mission_control.laboratory.simulation.liveness import RUNS_AGAIN_S, Watcher, first_unhealed
 from mission_control.laboratory.simulation.mission_run import MissionRun
-from mission_control.laboratory.simulation.operator_choices import OPERATOR, OperatorChange, OtherRules, carry_out
+from mission_control.laboratory.simulation.operator_choices import (
+    OPERATOR,
+    OperatorChange,
+    OtherRules,
+    RobotStop,
+    carry_out,
+    stop_and_lift,
+)
 from mission_control.laboratory.simulation.shape import MISSION
 from mission_control.laboratory.simulation.simulated_links import LinkedNetwork
 from mission_control.laboratory.simulation.simulated_machines import Machines, SimulatedZygote, current_machines
@@ -215,8 +222,8 @@ class _SupervisedMission:
         match fault:
             case OtherRules():  # in force since the bring-up
                 return
-            case OperatorChange():
-                self._change(fault)
+            case OperatorChange() | RobotStop():
+                self._operate(fault)
                 return
             case Starve(target=host, gap_s=gap_s):
                 self._machines.starve(host, fault.over_s, gap_s)
@@ -252,11 +259,15 @@ class _SupervisedMission:
         saying = say_hostile(message, self._network.join, self._clock, self._audit)
         self._saying.append(asyncio.get_running_loop().create_task(saying, context=stranger.context))
 
-    def _change(self, change: OperatorChange) -> None:
+    def _operate(self, choice: OperatorChange | RobotStop) -> None:
         if self._operator is None:
             self._operator = self._machines.begin("operator", self._shape.hosts[0])
         bus = self._operator.run(self._network.join, OPERATOR, self._clock)
-        work = carry_out(change, bus, self._audit)
+        work = (
+            carry_out(choice, bus, self._audit)
+            if isinstance(choice, OperatorChange)
+            else stop_and_lift(choice, bus, self._clock, self._audit)
+        )
         self._saying.append(asyncio.get_running_loop().create_task(work, context=self._operator.context))
 
     def _go_on(self, process: SimulatedProcess) -> None:

@@ -14,7 +14,9 @@ from typing import Literal
 from mission_control.laboratory.simulation.operator_choices import (
     OperatorChange,
     OtherRules,
+    RobotStop,
     draw_choices,
+    draw_stops,
 )
 from mission_control.laboratory.simulation.shape import BRING_UP_S
 from mission_control.laboratory.simulation.supervised_shape import SupervisedShape
@@ -121,13 +123,13 @@ class Hostile(_Sudden):
         return f"{self.target} hears hostile message {self.number} at {self.at_s:.3f} s"
 
 
-SupervisionFault = Pause | End | Cut | Starve | Hostile | OtherRules | OperatorChange
+SupervisionFault = Pause | End | Cut | Starve | Hostile | OtherRules | OperatorChange | RobotStop
 
 
 def draw_supervision_faults(shape: SupervisedShape) -> list[SupervisionFault]:
     """Return the faults of this mission and its operators' choices, in order of time."""
     dice = Random(f"supervision {shape.seed}")
-    found: list[SupervisionFault] = [*draw_choices(shape.pool, shape.groups()[-1])]
+    found: list[SupervisionFault] = [*draw_choices(shape.pool, shape.groups()[-1]), *draw_stops(shape.pool)]
     found += [_draw(dice, shape) for _ in range(dice.randint(1, MOST_FAULTS))]
     return sorted(found, key=lambda fault: (fault.at_s, fault.target))
 

@@ -141,6 +141,19 @@ def test_who_wants_and_never_gets_breaks_progress_unless_somebody_is_above_it() 
     assert judged(calm, *wants, *run, over) is None
 
 
+@pytest.mark.parametrize(("is_confirmed", "moves_until_s"), [(True, 2.0), (False, 3.0)])
+def test_a_packet_that_moves_a_stopped_robot_breaks_stopped(is_confirmed: bool, moves_until_s: float) -> None:
+    holds = [held(1, "scout1", "a-drive", 1), held(1, "radio1", "a-drive", 1)]
+    stop: Entry = (2, "operator", "stops", {"robot": "scout1", "is_confirmed": is_confirmed})
+    lift: Entry = (5, "operator", "lifts", {"robot": "scout1"})
+    for command in "DJ":
+        late = packet(moves_until_s + 0.1, command, "a-drive", 1)
+        assert broken_law(*holds, stop, late) == "stopped"
+        assert judged(*holds, stop, packet(moves_until_s, command, "a-drive", 1)) is None
+        assert judged(*holds, stop, lift, packet(5, command, "a-drive", 1)) is None
+    assert judged(*holds, stop, packet(4, "H", "a-drive", 1), packet(4, "V", "a-drive", 1)) is None
+
+
 def numbered(at_s: float, name: str, number: int) -> Entry:
     return (at_s, "rc_manager", "node", {"id": f"simulated/{name}", "parent": "simulated", "prio": number})
 

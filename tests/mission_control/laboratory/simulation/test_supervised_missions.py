@@ -107,6 +107,7 @@ def test_supervised_missions_suffer_everything() -> None:
         "the parent",
         "the capacity",
         "admission",
+        "an operator stops",
     ):
         assert word in words, word
     lasting = [fault.lasts_s for fault in faults if isinstance(fault, Pause)]
