@@ -45,7 +45,8 @@ class PriorityEvents:
         rising = self._rising()
         for arc in self._state.arcs.values():
             if arc in rising:
-                self._state.raise_to(arc, int((self._decision.now_s - arc.since_s) / self._aging_s + ROUNDING))
+                levels = int((self._decision.now_s - arc.since_s) / self._aging_s + ROUNDING)
+                self._state.raise_to(arc, max(arc.raised, levels))  # it has some already if its slice was cut
             elif arc.served(self._decision.now_s) or not arc.active or arc.state is RequestState.WAITING:
                 self._state.raise_to(arc, 0)
         if self._tree.age((arc.place_in_tree, arc.raised) for arc in self._state.arcs.values() if arc.raised):

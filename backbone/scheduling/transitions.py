@@ -75,7 +75,7 @@ class Transitions:
 
     def queue(self, arc: ArcEntry) -> None:
         """Queue the ARC behind its equals; write a line if its group is too large to be planned whole."""
-        arc.stamp = self.stamp()
+        arc.stamp, arc.raised = self.stamp(), 0
         arc.reservation = arc.retry_s = None
         arc.has_forced = False
         self.enter(arc, RequestState.WAITING)
@@ -142,7 +142,7 @@ class Transitions:
 
     def renew(self, arc: ArcEntry) -> None:
         """Begin a new slice of a served ARC that stays when an equal's slice ended; its place is behind its equals."""
-        arc.stamp = self.stamp()
+        arc.stamp, arc.raised = self.stamp(), 0
         arc.slice_s = self.decision.now_s
         arc.turns += 1
         self.ends.end_at(arc, self._slice_end_s(arc))
@@ -167,7 +167,7 @@ class Transitions:
         """Count the ARC's RCs as being disconnected; the next place of a served ARC is behind its equals."""
         cause = because(why, by)
         if arc.served(self.decision.now_s):
-            arc.stamp = self.stamp()
+            arc.stamp, arc.raised = self.stamp(), 0
         arc.swapped_out, arc.swapped_out_by = why, by
         self._count_way(arc)
         arc.afterwards = afterwards

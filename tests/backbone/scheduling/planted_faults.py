@@ -23,6 +23,8 @@ class Planted(NamedTuple):
     wrong: str
 
 
+LAST = "        arc.stamp, arc.raised = self.stamp(), 0\n"
+
 FAULTS = [
     Planted(
         "the youngest goes first",
@@ -33,13 +35,13 @@ FAULTS = [
     Planted(
         "an aborted slice costs its place",
         "transitions.py",
-        "        if arc.served(self.decision.now_s):\n            arc.stamp = self.stamp()\n        arc.swapped_out",
-        "        arc.stamp = self.stamp()\n        arc.swapped_out",
+        f"        if arc.served(self.decision.now_s):\n    {LAST}        arc.swapped_out",
+        f"{LAST}        arc.swapped_out",
     ),
     Planted(
         "a served ARC keeps its place",
         "transitions.py",
-        "        if arc.served(self.decision.now_s):\n            arc.stamp = self.stamp()\n        arc.swapped_out",
+        f"        if arc.served(self.decision.now_s):\n    {LAST}        arc.swapped_out",
         "        arc.swapped_out",
     ),
     Planted("an epoch is given twice", "switch.py", "rcs[rc].epoch += 1", "rcs[rc].epoch += 0"),
@@ -58,7 +60,7 @@ FAULTS = [
     Planted(
         "a new slice keeps its old place",
         "transitions.py",
-        "        arc.stamp = self.stamp()\n        arc.slice_s",
+        f"{LAST}        arc.slice_s",
         "        arc.slice_s",
     ),
     Planted(

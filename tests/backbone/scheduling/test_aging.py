@@ -97,3 +97,18 @@ def test_an_arc_that_fits_beside_its_parent_rises():
     bench.tell(ask("child", "v", path=[("watch", 0), ("parent", 1), ("child", 1)]))
     bench.run(30.0)
     assert bench.runs("child")
+
+
+def test_an_arc_that_rose_and_was_overridden_keeps_its_level_until_it_is_served():
+    """It fell to its own number, and a long slice was cut again and again by an ARC that had risen meanwhile."""
+    bench = Bench(manager(aging_s=2.0), unit("v"))
+    bench.tell(ask("high", "v", priority=3))
+    bench.tell(ask("low", "v", priority=1, run_s=3.0))
+    bench.at(5.5, Departed("high"))
+    bench.at(6.0, ask("human", "v", priority=9, console=True))
+    bench.at(6.5, ask("middle", "v", priority=2))
+    bench.at(7.0, Departed("human"))
+    bench.run(20.0)
+    assert bench.runs("low")[:2] == [(5.0, 6.0), (7.0, 10.0)]
+    assert bench.runs("middle")[0][0] == 10.0
+    assert bench.verdict() == []
