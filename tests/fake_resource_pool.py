@@ -40,6 +40,7 @@ from resource_pool.messages import (
     ArcQuestion,
     ArcState,
     AskArc,
+    AskBeat,
     Frame,
     GiveCommand,
     Noted,
@@ -74,6 +75,12 @@ class FakeArc:
         bus.declare_alive(self.address)
 
     @property
+    def state(self) -> ArcState:
+        epochs = self.epochs if self.granted else {}
+        owner, robot = self.parameters["owner"], self.rcs["scout"]
+        return ArcState(self.name, "fake", owner, self.rcs, self.granted, epochs, "slice", "other", -1.0, robot)
+
+    @property
     def epochs(self) -> dict[str, int]:
         return dict.fromkeys(self.rcs.values(), self.epoch)
 
@@ -86,6 +93,9 @@ class FakeArc:
             await self._tell(Suspending(self.name, reason, by, deadline_s))
         self.granted = False
         await self._tell(Suspended(self.name, reason, by, -1.0))
+
+    async def beat(self) -> None:
+        await self._tell(AskBeat(self.state))
 
     def publish(self, pixels: bytes, width_px: int, height_px: int, number: int = 0) -> None:
         frame = Frame(
@@ -119,10 +129,7 @@ class FakeArc:
             case Stop():
                 return Stopping()
             case AskArc():
-                epochs = self.epochs if self.granted else {}
-                owner = self.parameters["owner"]
-                robot = self.rcs["scout"]
-                return ArcState(self.name, "fake", owner, self.rcs, self.granted, epochs, "slice", "other", -1.0, robot)
+                return self.state
             case Command() | GiveCommand() as command:
                 return self._command(command)
             case wish:

@@ -78,6 +78,7 @@ class ConsoleModel:
         self._went: views.LostView | None = None
         self._asked_whom: events.ConsentAsked | None = None
         self._heard: list[events.ConsentHeard] = []
+        self._confirmed_s = 0.0  # when the ARC last reported that its grant continues
         self._refused = ""  # reason of the refusal of the last claim, if it was refused
         self._blind = ""  # robot that is held without usable pictures
         self.alarms = alarms or AlarmBook(beside=self.team.alarms)
@@ -261,8 +262,9 @@ class ConsoleModel:
         if self.mine and (stop := self.team.robots.stop_of(self.robot)) is not None:
             return f"{self.robot} is STOPPED by {stop.by}{f': {stop.reason}' if stop.reason else ''}"
         if self.held is not None:
-            slice_end = slice_end_line(self.held.until_s, now_s)
-            return f"you hold {self.robot or 'no robot'}{slice_end}"
+            if self._confirmed_s < self.team.links.back_s:
+                return f"the link is back; not yet known whether you still hold {self.robot or 'the RCs'}"
+            return f"you hold {self.robot or 'no robot'}{slice_end_line(self.held.until_s, now_s)}"
         if self.asked is None:
             if (given := self.orders.of(self.robot)) is not None:
                 return self.team.people.named(given.line)
@@ -305,13 +307,15 @@ class ConsoleModel:
             case events.AbilitiesKnown(abilities=abilities):
                 self.abilities = abilities if self.asked is not None else None
             case events.Granted(robot=robot, at_s=at_s):
-                self.held, self.lost, self.why, self._asked_whom = event, None, None, None
+                self.held, self._confirmed_s, self.lost, self.why, self._asked_whom = event, at_s, None, None, None
                 alarms.mended((views.AlarmKind.TAKEN, views.AlarmKind.REFUSED, views.AlarmKind.NO_ANSWER))
                 if self._went is not None:
                     line = f"{robot} was lost and is yours again: {self._went.why}"
                     alarms.happened(views.AlarmKind.TAKEN, robot, line, at_s, BACK_REMEDY, key=f"back:{self.name}")
                 self._went = None
                 self.robot = robot or self.robot
+            case events.HoldConfirmed(at_s=at_s):
+                self._confirmed_s = at_s
             case events.CommandApplied():
                 self.applied = event
                 alarms.mended((views.AlarmKind.NO_ANSWER,))

@@ -82,6 +82,11 @@ class Granted(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class HoldConfirmed(Event):
+    """The ARC reported that the present grant continues; several times in a second."""
+
+
+@dataclass(frozen=True, slots=True)
 class CommandApplied(Event):
     """A robot applied a command; its values may be clipped.
 
@@ -286,6 +291,7 @@ OwnEvent = (
     Asked
     | AbilitiesKnown
     | Granted
+    | HoldConfirmed
     | CommandApplied
     | CommandRefused
     | LinkTrouble
@@ -307,6 +313,7 @@ ConsoleEvent = OwnEvent | TeamEvent
 _WORDS: dict[type[object], str] = {
     AbilitiesKnown: "abilities",
     Suspended: "suspended",
+    HoldConfirmed: "confirmed",
     CommandApplied: "applied",
     CommandRefused: "refused",
     LinkTrouble: "no_answer",

@@ -32,10 +32,14 @@ class LinkBoard:
         self._radios: dict[str, Mapping[str, float]] = {}
         self._link = LinkHeard(0.0, True)
         self._link_heard_s = 0.0
+        self.back_s = NONE_S
+        """Time at which the link last came back; negative: it was never down."""
 
     def take_link(self, link: LinkHeard) -> None:
         """Record the state of the link, or a measurement of it."""
         if link.is_up:
+            if self.down_s(link.at_s) >= 0:
+                self.back_s = link.at_s
             self._link_heard_s = link.at_s
             latency_s = link.latency_s if link.latency_s >= 0 else self._link.latency_s
             self._link = dataclasses.replace(link, latency_s=latency_s)

@@ -18,7 +18,17 @@ from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log.operators import OperatorAction
 from backbone.naming import IllegalName
 from backbone.wire import Message
-from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
+from resource_pool.arc_client import (
+    ArcClient,
+    ArcNotice,
+    AskBeat,
+    Frame,
+    NotMyArc,
+    Resumed,
+    StopState,
+    Suspended,
+    Suspending,
+)
 from ui_console.model import events
 from ui_console.model.driving import HaltWish
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
@@ -238,7 +248,11 @@ class ArcClaim:
         """
         if self._arc is None:
             raise NotMyArc(f"{self._console.name} claims no ARC")
-        return await self._arc.handle(notice)
+        arc = self._arc
+        noted = await arc.handle(notice)
+        if isinstance(notice, AskBeat) and notice.state is not None and notice.state.epochs == arc.epochs != {}:
+            self._console.show(events.HoldConfirmed(self._console.clock.now_s()))
+        return noted
 
     async def arc_resumed(self, notice: Resumed) -> None:
         """Show the grant; see ``ArcListener``."""

@@ -27,7 +27,14 @@ from ui_console.session.teleoperation import Teleoperation
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
 TOLD_AFTER_S = 1.0  # chosen: a grant for which no other ARC has to end its slice is there by then
-_FOR_SCREENS_ONLY = (events.Asked, events.AbilitiesKnown, events.MomentBegan, events.PictureSeen, events.TurnedTo)
+_FOR_SCREENS_ONLY = (
+    events.Asked,
+    events.AbilitiesKnown,
+    events.HoldConfirmed,
+    events.MomentBegan,
+    events.PictureSeen,
+    events.TurnedTo,
+)
 
 
 class ScriptDriver:

@@ -9,7 +9,7 @@ from written_session import WrittenSession
 
 from resource_pool.arc_client import Stopper, StopState, Suspended
 from ui_console.model.consent import Consent, Settled, Sought, Topic
-from ui_console.model.events import GivenBack, Granted, Heard, LetGoNeeded, LinkHeard, MomentBegan
+from ui_console.model.events import GivenBack, Granted, Heard, HoldConfirmed, LetGoNeeded, LinkHeard, MomentBegan
 from ui_console.model.profile import Profile
 from ui_console.model.views import AlarmKind, LostView
 from ui_console.session.feed import LINK_FRESH_S
@@ -97,6 +97,22 @@ def test_what_is_shown_is_never_older_than_a_second_without_saying_so(word: Link
     assert shown.own(14.0).link_down_s < 0
     assert shown.own(14.0).is_held
     assert not [alarm for alarm in shown.team.alarms.views() if alarm.is_active]
+
+
+@pytest.mark.parametrize("cut", [LinkHeard(12.5, False), None])
+def test_after_a_cut_the_first_line_says_what_it_does_not_know_until_the_arc_confirms_the_hold(
+    cut: LinkHeard | None,
+) -> None:
+    shown = held_model()
+    shown.apply(LinkHeard(12.0, True, 0.002, until_s=13.0))
+    assert shown.status_line(12.1).startswith("you hold scout1")
+    if cut is not None:
+        shown.apply(cut)
+    for at_s in (14.0, 14.3):
+        shown.apply(LinkHeard(at_s, True, 0.002, until_s=at_s + 0.8))
+        assert shown.status_line(at_s) == "the link is back; not yet known whether you still hold scout1"
+    shown.apply(HoldConfirmed(14.5))
+    assert shown.status_line(14.5).startswith("you hold scout1")
 
 
 def test_what_has_to_be_let_go_is_said_only_while_a_robot_is_held() -> None:

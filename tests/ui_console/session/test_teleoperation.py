@@ -16,8 +16,18 @@ from backbone.mission_log.operators import OperatorActed, OperatorAction
 from resource_pool.arc_client import Suspended
 from resource_pool.commands import Halt as ArcHalt
 from resource_pool.commands import Move as ArcMove
+from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import GiveWish, MoveWish
-from ui_console.model.events import Asked, Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, said
+from ui_console.model.events import (
+    Asked,
+    Attention,
+    CommandApplied,
+    ConsoleEvent,
+    GivenBack,
+    Granted,
+    LinkHeard,
+    said,
+)
 from ui_console.session.teleoperation import Teleoperation
 
 FORWARD = MoveWish(0.1, 0.0)
@@ -327,5 +337,28 @@ def test_that_the_robot_is_there_is_told_to_the_mission_with_the_users_name(plac
             await driven.give_back()
             await placer.clock.sleep_s(0.1)
         assert heard == [("scout1", "was taken over by anna")]
+
+    placer_world(scene)
+
+
+@pytest.mark.parametrize("is_lost", [False, True])
+def test_the_next_heartbeat_of_the_arc_after_a_cut_shows_whether_the_robot_is_still_held(
+    is_lost: bool, placer_world: Any, beside: Any
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        shown = ConsoleModel("console-7", "anna")
+        async with beside(console(placer, shown.apply)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            [arc] = placer.arcs.values()
+            for is_up in (False, True):
+                await placer.clock.sleep_s(1.0)
+                shown.apply(LinkHeard(placer.clock.now_s(), is_up))
+            arc.granted = not is_lost
+            await placer.clock.sleep_s(0.2)
+            assert "not yet known whether you still hold scout1" in shown.status_line(placer.clock.now_s())
+            await arc.beat()
+            line = shown.status_line(placer.clock.now_s())
+            assert line.startswith("waiting for scout1" if is_lost else "you hold scout1")
 
     placer_world(scene)
