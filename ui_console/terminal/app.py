@@ -42,8 +42,9 @@ from ui_console.terminal.widgets import DrivePad, Panel
 class ConsoleApp(ConsoleDisplay):
     """One console's screen, and its keys."""
 
-    def on_key(self, _event: Key) -> None:
-        """Record that the operator is there."""
+    def on_key(self, event: Key) -> None:
+        """Record that the operator is there; Textual calls this right before the action of the key."""
+        self._read_s = event.time
         self._session.touch()
 
     def on_mouse_down(self, _event: MouseDown) -> None:
@@ -133,9 +134,7 @@ class ConsoleApp(ConsoleDisplay):
 
     def action_decide(self, is_given: bool) -> None:
         """Answer the question on the screen, if there is one; a later question is answered by a later press."""
-        consent = self._view.own.consent if self._view is not None else None
-        number = consent.number if consent is not None else 0
-        if self._answering.press(number, asyncio.get_running_loop().time()):
+        if number := self._answering.press(self._read_s, asyncio.get_running_loop().time()):
             self._session.decide(is_given, number)
 
     def on_app_blur(self, _event: AppBlur) -> None:

@@ -19,13 +19,14 @@ from textual.events import CursorPosition, Resize, Unmount
 from textual.screen import Screen
 from textual.widgets import Static
 
-from ui_console.model.answering import AnswerGrip
+from ui_console.model.answering import AWAKE_EVERY_S, AnswerGrip
 from ui_console.model.driving import SPEED
 from ui_console.model.profile import Profile
 from ui_console.model.views import ConsoleView
 from ui_console.session.verbs import Session
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Dialog, LiftQuestion
+from ui_console.terminal.driver import KeysDropped
 from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, Hint, has, hints, robot_meant
@@ -117,6 +118,7 @@ class ConsoleDisplay(EndingApp):
         self._view: ConsoleView | None = None
         self._stops: set[asyncio.Task[None]] = set()
         self._answering = AnswerGrip()
+        self._read_s = 0.0  # when the newest key was read
 
     @property
     def drives(self) -> bool:
@@ -150,6 +152,7 @@ class ConsoleDisplay(EndingApp):
         if self.profile is Profile.TERMINAL:
             self.set_interval(REDRAW_EVERY_S, self.redraw_video)
         self.set_interval(LINK_LOOK_S, self.redraw_if_cut)
+        self.set_interval(AWAKE_EVERY_S, lambda: self._answering.look(asyncio.get_running_loop().time()))
 
     def on_resize(self, _event: Resize) -> None:
         """Adapt the layout to the new size."""
@@ -160,6 +163,11 @@ class ConsoleDisplay(EndingApp):
         main = self._main()
         if main is not None:
             main.query_one(DrivePad).answered()
+
+    def on_keys_dropped(self, message: KeysDropped) -> None:
+        """Say why the keys had no effect; one that is still held answers no question."""
+        super().on_keys_dropped(message)
+        self._answering.press(message.time, asyncio.get_running_loop().time())
 
     def on_drive_pad_unanswered(self, _message: DrivePad.Unanswered) -> None:
         """Show why the pad let go."""
@@ -184,6 +192,8 @@ class ConsoleDisplay(EndingApp):
         if main is None:
             return
         view = self._view = self._session.model.view(self._session.now_s())
+        consent, loop = view.own.consent, asyncio.get_running_loop()
+        self._answering.show(consent.number if consent is not None else 0, loop.time())
         main.set_class(view.own.link_down_s >= 0, "-unlinked")
         self._show_head(main, view)
         main.query_one(DrivePad).disabled = self._session.model.reach is None

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Callable
 
 import msgspec
 import pytest
 from console_scenes import ASK, GRANT, SCHEDULE, STOP, TEAM_EVENTS, held_model, model, rc
 from pressed_keys import FORWARD, SIZE
 from screen_text import screen_text
+from textual.events import Key
+from textual.message import Message
 from textual.widgets import Input
 from written_session import WrittenSession, settle
 
@@ -25,6 +28,7 @@ from ui_console.model.events import (
 from ui_console.model.profile import Profile
 from ui_console.session.feed import LogAway
 from ui_console.terminal.app import ConsoleApp, read_value
+from ui_console.terminal.driver import KeysDropped
 from ui_console.terminal.tables import PanelName
 from ui_console.terminal.widgets import Panel, Video
 
@@ -233,6 +237,27 @@ async def test_a_key_that_is_held_answers_one_question_and_not_the_next() -> Non
         screen.redraw()
         await pilot.press(*"gggg")
     assert session.wanted == [("decide", True, 1)]
+
+
+@pytest.mark.parametrize("comes", [lambda: Key("g", "g"), KeysDropped])
+async def test_a_key_from_before_the_question_does_not_answer_it(comes: Callable[[], Message]) -> None:
+    """It waits for a busy console, or is held by a person since a pause of the console, whose keys are dropped."""
+    shown = held_model()
+    session = WrittenSession(shown=shown)
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=(160, 36)) as pilot:
+        await pilot.pause(2.0)
+        before = comes()
+        await pilot.pause(0.1)
+        shown.apply(Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0, number=1))
+        screen.redraw()
+        screen.post_message(before)
+        await settle(pilot)
+        await pilot.press(*"ggg")
+        assert session.wanted == []
+        await pilot.pause(1.0)
+        await pilot.press("g")
+        assert session.wanted == [("decide", True, 1)]
 
 
 async def test_a_pendants_holder_is_asked_in_the_same_words_and_answers_by_the_same_keys() -> None:
