@@ -163,6 +163,7 @@ def print_(
     """Print its messages in the order of sending; with --json, whole, one in each line."""
     from backbone.command_line.recording_work import print_messages
 
+    _require_ordered(since, until)
     run(lambda: print_messages(file, tuple(keys or ()), since, until, most, as_json=as_json))
 
 
@@ -177,6 +178,7 @@ def print_story(
     """Print the events of the mission's log that it holds, as 'story' and 'log' print them live."""
     from backbone.command_line.recording_work import print_events
 
+    _require_ordered(since, until)
     run(lambda: print_events(file, name, since, until, as_json=as_json))
 
 
@@ -312,6 +314,12 @@ def replay(
         raise typer.BadParameter("--class, --set, --tolerance and --json are for --without NAME")
     wanted = replaying.Playing(mission, since_s, speed or 1.0, is_stepped, tuple(keys or ()))
     run(lambda: replaying.play(file, wanted))
+
+
+def _require_ordered(since_s: float, until_s: float | None) -> None:
+    """Refuse times between which no message can be."""
+    if until_s is not None and until_s < since_s:
+        raise typer.BadParameter(f"--until {until_s:g} comes before --since {since_s:g}: exchange them")
 
 
 def _refuse(options: Mapping[str, object], with_what: str) -> None:

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 from small_recordings import SCOUT, Said, recorded
+from typer.testing import CliRunner
 
+from backbone.command_line.cli import app
 from backbone.command_line.opened_recording import NothingSelected
 from backbone.command_line.recording_work import print_messages
 from backbone.command_line.replaying import Playing, decide_anew, play, print_reasons_at
@@ -51,6 +53,14 @@ async def test_the_remedy_for_a_missing_schedule_depends_on_the_time(night: Path
     with pytest.raises(NotRecorded) as refused:
         await decide_anew(night, since_s, {}, as_json=False)
     assert refused.value.remedy.startswith(remedy)
+
+
+@pytest.mark.parametrize("command", ["print", "story"])
+def test_times_between_which_nothing_can_be_are_wrong_usage(night: Path, command: str) -> None:
+    wrong = CliRunner().invoke(app, ["recording", command, str(night), "--since", "10", "--until", "5"])
+    assert wrong.exit_code == ExitCode.USAGE
+    assert "--until 5 comes before --since 10" in wrong.output
+    assert CliRunner().invoke(app, ["recording", command, str(night), "--since", "1", "--until", "1"]).exit_code == 0
 
 
 async def test_where_nothing_was_sent_no_message_is_printed_and_said(
