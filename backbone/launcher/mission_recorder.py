@@ -54,30 +54,36 @@ def require_new(path: Path) -> None:
     """Return if a recording can begin in this file, else raise.
 
     Raises:
-        RecorderFailed: The file exists, or this user may not write in its folder.
+        RecorderFailed: The file exists, or cannot be made.
     """
-    if path.exists():
+    if os.path.exists(path):
         raise RecorderFailed(f"{path} exists")
     require_writable(path)
 
 
 def require_writable(path: Path) -> None:
-    """Return if this user may write in the folder of this file, else raise.
+    """Return if a recording can begin in the first unused file of this series, else raise.
 
     Raises:
-        RecorderFailed: This user may not, or there is no such folder.
+        RecorderFailed: There is no such folder, or no such file can be made in it.
     """
     folder = path.absolute().parent
-    if not folder.is_dir():
+    if os.path.isdir(path):
+        raise RecorderFailed(f"{path} is a folder")
+    if not os.path.isdir(folder):
         raise RecorderFailed(f"there is no folder {folder}")
-    if not os.access(folder, os.W_OK):
-        raise RecorderFailed(f"{folder} cannot be written")
+    free = first_free(path)
+    try:
+        free.open("xb").close()  # whether that is possible, no question to the system tells for all file systems
+        free.unlink()
+    except OSError as error:
+        raise RecorderFailed(f"{free} cannot be written: {error.strerror or error}") from error
 
 
 def first_free(path: Path) -> Path:
     """Return the first unused name in a series of recordings: ``night.mcap``, ``night-2.mcap`` and so on."""
     numbered = (path.with_stem(f"{path.stem}-{number}") for number in itertools.count(2))
-    return next(each for each in itertools.chain((path,), numbered) if not each.exists())
+    return next(each for each in itertools.chain((path,), numbered) if not os.path.exists(each))
 
 
 def recorder_of_mission(
