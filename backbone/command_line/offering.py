@@ -9,6 +9,7 @@ from backbone.launcher.endings import ExitCode, say
 from backbone.launcher.kept_creator import Offered
 from backbone.launcher.mission_recorder import require_writable
 from backbone.launcher.offer import Offering
+from backbone.launcher.preconditions import require_process_table
 
 
 async def offer_this_machine(
@@ -17,6 +18,7 @@ async def offer_this_machine(
     """Run a creator on this machine for the mission until it or a signal ends the offer."""
     offered = Offered(mission, connect, host, tags, read_secret_option(secret_file), record)
     is_file = secret_file is not None and str(secret_file) != "-"
+    require_process_table()
     if record is not None:
         require_writable(record)
     say(f"{host} is offered to mission {mission}; end with Ctrl-C")

@@ -31,7 +31,12 @@ from backbone.launcher.launcher import Launcher
 from backbone.launcher.mission_recorder import MissionRecorder, recorder_of_mission, require_new
 from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
-from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up, refuse_paths_of_no_message
+from backbone.launcher.preconditions import (
+    prepare_endpoint,
+    refuse_if_up,
+    refuse_paths_of_no_message,
+    require_process_table,
+)
 from backbone.mission.model import MissionDescription
 from backbone.operating_system.ending_signals import orders_to_end
 from backbone.operating_system.heaps import share_heaps
@@ -44,6 +49,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     """Bring the mission up, run it, take it down; return when all its processes and files are gone.
 
     Raises:
+        NoProcessTable: The system does not show its processes.
         MissionAlreadyUp: A mission of this name runs on this machine.
         FolderInUse: A mission of this name is coming up or ending on this machine.
         PathNotUtf8: The path of a file or folder of the mission is no UTF-8.
@@ -53,6 +59,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
         BackboneError: The nameserver did not start.
     """
     began_s = time.monotonic()
+    require_process_table()
     share_heaps()
     files = [path.absolute() for path in (options.trace, options.record) if path is not None]
     refuse_paths_of_no_message(description.name, description.source, *files)

@@ -10,6 +10,7 @@ from backbone import run_files
 from backbone.authentication import SECRET_NAME, keep_secret, new_secret, socket_endpoint
 from backbone.errors import Refusal
 from backbone.mission.model import Host, MissionDescription
+from backbone.operating_system import processes
 
 
 class MissionAlreadyUp(Refusal):
@@ -31,6 +32,23 @@ class PathNotUtf8(Refusal):
 
     code = "run.path"
     remedy = "Rename that file or folder, or use one whose whole path is UTF-8."
+
+
+class NoProcessTable(Refusal):
+    """The system does not show its processes, so none can be watched."""
+
+    code = "run.no_processes"
+    remedy = f"Mount it: {processes.MOUNTS_TABLE!r}, or start the container or service so that it sees it."
+
+
+def require_process_table() -> None:
+    """Return if the processes of a mission can be watched here, else raise.
+
+    Raises:
+        NoProcessTable: They cannot.
+    """
+    if not processes.is_table_readable():
+        raise NoProcessTable(f"{processes.TABLE} of this machine cannot be read, so no process can be watched")
 
 
 def refuse_paths_of_no_message(mission: str, *paths: str | Path) -> None:

@@ -9,6 +9,8 @@ from collections.abc import Collection, Iterable
 from contextlib import suppress
 from pathlib import Path
 
+TABLE, MOUNTS_TABLE = "/proc", "mount -t proc proc /proc"
+"""Folder in which the kernel shows its processes, and the command that mounts it."""
 _NS = 1e-9
 _LINE_BYTES = 4096  # the kernel's lines are shorter
 
@@ -24,6 +26,11 @@ def first_bytes(path: str, most: int) -> bytes:
         return os.read(file, most)
     finally:
         os.close(file)
+
+
+def is_table_readable() -> bool:
+    """Return whether the kernel shows its processes and the load of its processors, as ``/proc`` does if mounted."""
+    return os.access("/proc/self/stat", os.R_OK) and os.access("/proc/stat", os.R_OK)
 
 
 def threads() -> int:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shutil
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import msgspec
@@ -125,3 +128,23 @@ def test_a_folder_too_deep_for_a_socket(
     deep.mkdir()
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(deep))
     assert "XDG_RUNTIME_DIR" in refused(SocketPathTooLong, shipped, UpOptions(), deep)
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["up", str(MISSION_XML), "--headless"],
+        ["creator", "--host", "far", "--mission", "iros2001", "--connect", "tcp/127.0.0.1:7447"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_a_machine_that_shows_no_processes(command: list[str]) -> None:
+    hidden = ["unshare", "--map-root-user", "--mount", "sh", "-c", 'mount -t tmpfs none /proc && exec "$@"', "sh"]
+    if shutil.which("unshare") is None or subprocess.run([*hidden, "true"], check=False).returncode:
+        pytest.skip("this account may have no mounts of its own")
+    words = [*hidden, sys.executable, "-P", "-m", "backbone.command_line.cli", *command]
+    done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=30)
+    assert done.returncode == 4, done.stderr
+    assert "refused [run.no_processes]: /proc of this machine cannot be read" in done.stderr
+    assert "comes up" not in done.stderr
