@@ -220,12 +220,20 @@ def _check_resources(tables: Tables, report: Report) -> None:
         elif kind not in tables.types:
             is_known(resource, "type", "type of resource", tables.resource_types(), report)
         check_host(resource, tables, report)
+        facts = tables.facts_of(kind)
+        if facts is not None and not facts.failure and not set(SET_BY_RESOURCE) <= set(facts.given):
+            report.fault(
+                resource.place_of("type"),
+                f"type {kind} is no resource: its class {tables.types[kind].text('class')} is no resource controller",
+                "Derive the class from resource_pool.resource_controller:ResourceController",
+            )
+            continue
         check_parameters(resource, SET_BY_RESOURCE, report)
         check_class_parameters(resource, SET_BY_RESOURCE, tables, report)
         _check_uses(resource, tables, report)
         check_driver(resource, tables, report)
         _check_world_of(resource, tables, report)
-        if (facts := tables.facts_of(resource.text("type"))) is not None and ROOM in facts.given:
+        if facts is not None and ROOM in facts.given:
             check_floor_plan(resource, report)
         _check_network_id(resource, ids, report)
         capacity = resource.number("capacity")

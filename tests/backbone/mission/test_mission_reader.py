@@ -305,8 +305,19 @@ def test_members_of_a_process_are_on_the_host_that_one_of_them_names(tmp_path: P
     assert hosts == {("hardware", "base"), ("", "")}
 
 
-def test_a_new_kind_of_hardware_needs_no_other_schema(tmp_path: Path) -> None:
+def test_a_resource_whose_class_is_no_resource_controller_is_refused(tmp_path: Path) -> None:
     lidar = '<type name="lidar" class="backbone.component.component:Component" subsystem="resource_pool"/>\n  </types>'
+    text = changed(("  </types>", lidar), ("  </resources>", '<resource type="lidar" name="lidar1"/></resources>'))
+    [fault] = faults_in(tmp_path, text)
+    assert fault.message == (
+        "type lidar is no resource: its class backbone.component.component:Component is no resource controller"
+    )
+    assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith('type="lidar"')
+
+
+def test_a_new_kind_of_hardware_needs_no_other_schema(tmp_path: Path) -> None:
+    base = "resource_pool.resource_controller:ResourceController"
+    lidar = f'<type name="lidar" class="{base}" subsystem="resource_pool"/>\n  </types>'
     description = read_text(
         tmp_path,
         changed(
