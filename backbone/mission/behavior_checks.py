@@ -8,6 +8,7 @@ from backbone.mission.class_facts import ANY_ARC, ClassFacts
 from backbone.mission.document import Element
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.parameter_checks import check_class_parameters
+from backbone.mission.place_checks import check_places
 from backbone.mission.reading_checks import check_named, check_readings
 from backbone.mission.report import Report, listed
 from backbone.mission.tables import (
@@ -63,6 +64,7 @@ def check_behaviors(tables: Tables, report: Report) -> None:
         _check_inside(behavior, tables, report)
         check_readings(behavior, tables, report)
         check_named(behavior, tables, report)
+        check_places(behavior, tables, report)
     sets = _Sets(tables)
     arc_kinds = [name for name in tables.types if tables.needs(name)]
     for behavior, arc in tables.claims():

@@ -173,7 +173,7 @@ def _simple(one: ValueSchema, definitions: ValueSchema) -> ValueSchema:
     if "$ref" in one:
         beside = {key: value for key, value in one.items() if key != "$ref"}  # such as the default
         return _simple({**definitions[one["$ref"]], **beside}, definitions)
-    kept = {key: one[key] for key in ("type", "enum", "default", "names", "counts", *_META) if key in one}
+    kept = {key: one[key] for key in ("type", "enum", "default", "names", "counts", "along", *_META) if key in one}
     if "anyOf" in one:
         kept["anyOf"] = [_simple(each, definitions) for each in one["anyOf"]]
     return kept

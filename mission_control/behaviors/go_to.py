@@ -17,7 +17,7 @@ from backbone.ranges import Duration
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
-from mission_control.behaviors.motion import Coordinate, DrivingSpeed, FloorPoint, NamedLocalizer, Reach
+from mission_control.behaviors.motion import AlongDepth, AlongWidth, DrivingSpeed, FloorPoint, NamedLocalizer, Reach
 from mission_control.behaviors.way import Way
 from mission_control.messages import BehaviorStatus
 
@@ -60,8 +60,8 @@ class GoToParameters(WayParameters, frozen=True, kw_only=True):
         y_m: The place, along the room's depth.
     """
 
-    x_m: Coordinate
-    y_m: Coordinate
+    x_m: AlongWidth
+    y_m: AlongDepth
 
 
 W = TypeVar("W", bound=WayParameters)

@@ -32,7 +32,9 @@ DrivingSpeed = Annotated[float, Meta(gt=0, le=MOST_M_S)]
 Reach = Annotated[float, Meta(ge=NEAREST_M, le=FARTHEST_M)]
 """A distance from a place that counts as reached."""
 Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
-"""A place along one side of the room."""
+"""A place along one side of the room; ``check`` compares those below with the mission's room."""
+AlongWidth = Annotated[Coordinate, Meta(extra_json_schema={"along": "width"})]
+AlongDepth = Annotated[Coordinate, Meta(extra_json_schema={"along": "depth"})]
 Attempts = Annotated[int, Meta(ge=1, le=MOST_TIMES)]
 """A number of attempts."""
 Times = Annotated[int, Meta(ge=0, le=MOST_TIMES)]
