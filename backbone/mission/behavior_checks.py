@@ -9,7 +9,7 @@ from backbone.mission.document import Element
 from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.place_checks import check_places
-from backbone.mission.reading_checks import check_named, check_readings
+from backbone.mission.reading_checks import check_named, check_own_branch, check_readings
 from backbone.mission.report import Report, listed
 from backbone.mission.tables import (
     Tables,
@@ -63,6 +63,7 @@ def check_behaviors(tables: Tables, report: Report) -> None:
         check_class_parameters(behavior, TREE_PARAMETERS, tables, report)
         _check_inside(behavior, tables, report)
         check_readings(behavior, tables, report)
+        check_own_branch(behavior, tables, report)
         check_named(behavior, tables, report)
         check_places(behavior, tables, report)
     sets = _Sets(tables)

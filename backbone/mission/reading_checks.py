@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 from backbone.component.abilities import FieldForm, ValueKind
 from backbone.creator.messages import creator_name
+from backbone.mission.behavior_reports import BehaviorStatus
 from backbone.mission.class_facts import shipped_classes
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
@@ -21,6 +22,8 @@ READINGS = "Readings"
 """Value of their parameter ``message`` for conditions on measurements of an RC."""
 VALUES = "values."
 """Prefix of a report's name in their parameter ``field``."""
+PROGRESS, STATUS = "BehaviorState", "status"
+"""Values of their parameters ``message`` and ``field`` for conditions on the progress of a behavior."""
 ALWAYS_THERE = ("", "at_s", "rc")
 """Fields of all readings; the first stands for no field."""
 
@@ -59,6 +62,24 @@ def check_readings(behavior: Element, tables: Tables, report: Report) -> None:
             given["field"].place_of("value"),
             f"readings of {name} have no {quoted(field)}{report.hint(near, forms)}",
             f"There is: {listed(forms)}",
+        )
+
+
+def check_own_branch(behavior: Element, tables: Tables, report: Report) -> None:
+    """Report a condition on the end of a behavior around it, which lasts at least as long as the condition."""
+    kind = tables.types.get(behavior.text("type"))
+    given = {one.text("name"): one for one in behavior.all("parameter")}
+    if kind is None or kind.text("class") != CONDITION or _text(given, "message") != PROGRESS:
+        return
+    name, wanted = _text(given, "source").removeprefix(f"{Subsystem.MISSION_CONTROL}/"), _text(given, "equals")
+    around = next((one for one in tables.behaviors if one.text("name") == name), None)
+    if around is None or _text(given, "field") != STATUS or wanted in ("", BehaviorStatus.RUNNING):
+        return
+    if any(one is behavior for one in around):
+        report.fault(
+            given["source"].place_of("value"),
+            f"{behavior.text('name')} asks whether {name} has ended with {wanted}, and is part of it",
+            "Name a behavior that can end before this one, such as one beside it",
         )
 
 

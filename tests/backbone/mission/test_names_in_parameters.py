@@ -74,3 +74,29 @@ def test_a_name_that_nothing_has_is_refused(tmp_path: Path, text: str, message: 
 )
 def test_a_name_of_something_or_of_what_the_file_does_not_show_passes(tmp_path: Path, text: str) -> None:
     read_text(tmp_path, text)
+
+
+def progress_of(source: str, equals: str = "success") -> str:
+    given = {"message": "BehaviorState", "source": source, "field": "status", "equals": equals}
+    parameters = "".join(f'<parameter name="{one}" value="{value}"/>' for one, value in given.items())
+    first = '<behavior type="wait" name="first" priority="1"><parameter name="seconds" value="1"/></behavior>'
+    condition = f'<behavior type="condition" name="own" priority="1">{parameters}</behavior>'
+    attempts = '<parameter name="num_attempts" value="2"/>'
+    inner = f'<behavior type="retry" name="inner" priority="1">{attempts}{condition}</behavior>'
+    outer = f'<behavior type="sequence" name="outer" priority="1">{first}{inner}</behavior>'
+    return MISSION.replace("</behaviors>", f"{outer}</behaviors>")
+
+
+@pytest.mark.parametrize("equals", ["success", "failure"])
+@pytest.mark.parametrize("source", ["outer", "mission_control/inner", "own"])
+def test_a_condition_on_the_end_of_its_own_branch_is_refused(tmp_path: Path, source: str, equals: str) -> None:
+    text = progress_of(source, equals)
+    [fault] = faults_in(tmp_path, text)
+    name = source.rpartition("/")[2]
+    assert fault.message == f"own asks whether {name} has ended with {equals}, and is part of it"
+    assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith(f'value="{source}"')
+
+
+@pytest.mark.parametrize("text", [progress_of("first"), progress_of("watch-scout1"), progress_of("outer", "running")])
+def test_a_condition_on_another_branch_or_its_present_progress_passes(tmp_path: Path, text: str) -> None:
+    read_text(tmp_path, text)
