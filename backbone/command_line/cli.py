@@ -107,7 +107,7 @@ def check(
         raise typer.BadParameter("--for and --trace need --dry-run")
     from backbone.mission.reader import read_written_mission
 
-    description, _ = or_exit(lambda: read_written_mission(mission_file))
+    description, _ = or_exit(lambda: read_written_mission(mission_file, say))
     say(
         f"{mission_file}: mission {description.name} is fine: {counted(len(description.resources), 'resource')}, "
         f"{counted(len(description.types), 'component type')} on {counted(len(description.hosts), 'host')}"

@@ -46,18 +46,25 @@ def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
     return {path: _known.get(path) or failed[path] for path in class_paths}
 
 
-def judge(questions: Sequence[Question]) -> list[str]:
-    """Return each class's objection to its parameters; empty: it starts with them, or gave no answer.
+def judge(questions: Sequence[Question]) -> tuple[list[str], dict[str, str]]:
+    """Return each class's objection to its parameters, empty if it starts with them or gave no answer.
 
     Args:
         questions: About classes that can be imported; their modules are run.
+
+    Returns:
+        The objections, and class path → why the class gave no answer.
     """
     texts = [msgspec.json.encode(one, order="sorted").decode() for one in questions]
-    left = [text for text in dict.fromkeys(texts) if text not in _judged]
-    if left:
-        printed, _reason = _printed("judge", left)
+    asked = dict(zip(texts, [one.class_path for one in questions], strict=True))
+    left, silent = [text for text in asked if text not in _judged], dict[str, str]()
+    while left:
+        printed, reason = _printed("judge", left, "it does not judge its parameters")
         _judged.update(zip(left, map(msgspec.json.decode, printed), strict=False))
-    return [_judged.get(text, "") for text in texts]
+        if left := left[len(printed) :]:
+            silent[asked[left[0]]] = reason
+            left = [text for text in left if asked[text] not in silent]
+    return [_judged.get(text, "") for text in texts], silent
 
 
 def arrange(question: UnitsQuestion) -> Arranged:
@@ -68,7 +75,7 @@ def arrange(question: UnitsQuestion) -> Arranged:
     """
     text = msgspec.json.encode(question, order="sorted").decode()
     if text not in _arranged:
-        printed, reason = _printed("arrange", [text])
+        printed, reason = _printed("arrange", [text], "their modules are not imported")
         if not printed:
             remedy = "Mend the class of a module, so that its file can be imported"
             return Arranged(faults=(UnitFault(f"the modules' classes cannot be asked: {reason}", remedy),))
@@ -78,7 +85,7 @@ def arrange(question: UnitsQuestion) -> Arranged:
 
 def _asked(class_paths: Sequence[str]) -> tuple[dict[str, ClassFacts], str]:
     """Return the answers up to the first class that ended or blocked the process, and the reason for that."""
-    printed, reason = _printed("facts", class_paths)
+    printed, reason = _printed("facts", class_paths, "its module is not imported")
     return dict(zip(class_paths, map(_facts, printed), strict=False)), reason
 
 
@@ -89,8 +96,12 @@ def _facts(line: bytes) -> ClassFacts:
         return ClassFacts(failure=f"what it declares cannot be read: {error}")
 
 
-def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
-    """Return the lines that the other process printed, one for each question, and why there are not more."""
+def _printed(what: str, about: Sequence[str], late: str) -> tuple[list[bytes], str]:
+    """Return the lines that the other process printed, one for each question, and why there are not more.
+
+    Args:
+        late: What did not happen if the process needs too long, for people.
+    """
     stacks_at_s = time.monotonic() + WITHIN_S * STACKS_AFTER  # of the machine: the start of the process counts
     command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what, f"{stacks_at_s}"]
     questions = "\0".join(about).encode()  # no arguments, whose length is limited
@@ -102,7 +113,7 @@ def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
         ).stdout
     except subprocess.TimeoutExpired as expired:
         printed, place = expired.stdout or b"", _place(expired.stderr or b"")
-        reason = f"its module is not imported within {WITHIN_S:g} s{place and '; it is at '}{place}"
+        reason = f"{late} within {WITHIN_S:g} s{place and '; it is at '}{place}"
     return printed[: printed.rfind(b"\n") + 1].splitlines(), reason
 
 

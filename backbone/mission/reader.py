@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from backbone.mission.arranged import Arranged
@@ -23,18 +24,24 @@ from backbone.mission.validation import fill_defaults, repair, validated
 __all__ = ["Fault", "MissionInvalid", "read_mission", "read_mission_bytes", "read_written_mission"]
 
 
+log = logging.getLogger(__name__)
+
+
 def read_mission(path: str | Path) -> MissionDescription:
     """Return the mission in the file; see ``read_written_mission``."""
     return read_written_mission(path)[0]
 
 
-def read_written_mission(path: str | Path) -> tuple[MissionDescription, bytes]:
+def read_written_mission(
+    path: str | Path, warn: Callable[[str], object] = log.warning
+) -> tuple[MissionDescription, bytes]:
     """Return the mission in the file, and the file's content. No component is started.
 
     A separate process imports the classes of the file's own types, to ask them for their parameters.
 
     Args:
         path: The mission file; faults contain this path.
+        warn: Called with a line for each class that could not be asked, so that the check is incomplete.
 
     Raises:
         MissionInvalid: With every fault of the file, in its order.
@@ -43,10 +50,15 @@ def read_written_mission(path: str | Path) -> tuple[MissionDescription, bytes]:
     data = read_bytes(Path(path), report)
     if data is None:
         raise MissionInvalid(report.faults())
-    return read_mission_bytes(data, str(path)), data
+    return read_mission_bytes(data, str(path), warn=warn), data
 
 
-def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFacts] | None = None) -> MissionDescription:
+def read_mission_bytes(
+    data: bytes,
+    source: str,
+    classes: Mapping[str, ClassFacts] | None = None,
+    warn: Callable[[str], object] = log.warning,
+) -> MissionDescription:
     """Return the mission in these bytes, as ``read_mission`` does for a file.
 
     Args:
@@ -54,6 +66,7 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
         source: Its path, for faults; other files named in the mission are relative to it.
         classes: Facts of classes besides the shipped ones; the connections of modules are not checked then. None: ask
             the classes that the mission names, those of modules included.
+        warn: As for ``read_written_mission``.
 
     Raises:
         MissionInvalid: With every fault, in the order of the file.
@@ -69,7 +82,7 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
         known = known_classes(root) if classes is None else {**classes, **shipped_classes()}
         check(root, known, report)
         if classes is None:
-            _check_rules(root, known, report)
+            _check_rules(root, known, report, warn)
             arranged = _arranged(root, report) if mission is not None else arranged
     faults = report.faults()
     if faults or mission is None:
@@ -77,13 +90,19 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
     return describe(mission, source, known, arranged.parameters)
 
 
-def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:
+def _check_rules(
+    root: Element, classes: Mapping[str, ClassFacts], report: Report, warn: Callable[[str], object]
+) -> None:
     """Report parameters that their class refuses, by rules that only the class can check."""
     tables = Tables.of(root, classes)
     opened = open_questions(tables)
-    for (element, _), refusal in zip(opened, judge([question for _, question in opened]), strict=True):
+    refusals, silent = judge([question for _, question in opened])
+    for (element, question), refusal in zip(opened, refusals, strict=True):
         if refusal:
             report_refusal(element, refusal, tables, report)
+        elif reason := silent.pop(question.class_path, ""):
+            what = f"warning: whether {question.class_path} starts with its parameters is unknown: {reason}"
+            warn(str(Fault(report.file, *element.place, what, "Mend its __post_init__, or see whether it starts")))
 
 
 def _arranged(root: Element, report: Report) -> Arranged:
