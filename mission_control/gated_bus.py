@@ -80,6 +80,7 @@ class GatedBus:
         self.route: Answer | None = None
         """Gets the component's questions; None: ``answer`` gets them."""
         self.on_bug: Callable[[BaseException], None] = bus.on_bug
+        self.is_kept = True
         self.commands = 0
         self._opened, self._quiet = asyncio.Event(), asyncio.Event()
         self._quiet.set()

@@ -42,6 +42,8 @@ class BusBase(ABC):
         """Callback for an exception that is no refusal."""
         self.on_unreadable: Callable[[str, Refusal], None] = lambda _key, _refusal: None
         """Callback for a publication that cannot be read."""
+        self.is_kept = False
+        """True while a component lives on this bus."""
         self.closed = False
         self.asked = self.answered = self.published = self.heard = self.refused = self.unreadable = 0
         self.told = 0
@@ -183,7 +185,14 @@ class BusBase(ABC):
 
         Open questions of this bus end with ``NoResponder``. Questions to this bus that are still being answered end
         with ``NoResponder`` at their askers.
+
+        Raises:
+            RuntimeError: A component lives on this bus.
         """
+        if self.is_kept:
+            raise RuntimeError(
+                "only the end of a component closes its bus; write self.end(reason), or close what subscribe returned"
+            )
         if self._closing is None:
             self._tell_all()
             self.closed = True

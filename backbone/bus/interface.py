@@ -79,10 +79,12 @@ class Bus(Protocol):
     Attributes:
         on_bug: Callback for an exception that is no refusal; settable.
         on_unreadable: Callback, with key and reason, for a publication that a listener did not get; settable.
+        is_kept: True while a component lives on this bus, so that only its end may close it; settable.
     """
 
     on_bug: Callable[[BaseException], None]
     on_unreadable: Callable[[str, Refusal], None]
+    is_kept: bool
 
     @property
     def mission(self) -> str:
@@ -227,6 +229,9 @@ class Bus(Protocol):
 
         Open questions of this bus, and questions that it is still answering, end with ``NoResponder`` at their
         requesters.
+
+        Raises:
+            RuntimeError: A component lives on this bus; without its declarations it would stay ready, and hear nothing.
         """
 
 

@@ -309,7 +309,7 @@ class Component(Generic[P_co]):
             LinkError: No nameserver answered within ``REGISTER_WITHIN_S``.
             BaseException: The bug that ended the component.
         """
-        self.bus.on_bug, self.bus.on_unreadable = self.fail, UnreadableKeys(self).log
+        self.bus.on_bug, self.bus.on_unreadable, self.bus.is_kept = self.fail, UnreadableKeys(self).log, True
         try:
             if await self._unless_ended(self._claim_name(), "claim"):
                 await self._live_and_report_end()
@@ -320,6 +320,7 @@ class Component(Generic[P_co]):
 
     async def leave_bus(self) -> None:
         """Withdraw all declarations of the component."""
+        self.bus.is_kept = False
         await self.bus.close()
 
     async def _claim_name(self) -> None:

@@ -145,7 +145,7 @@ async def test_a_hub_restarted_on_its_port_finds_everybody_again(endpoint: str, 
         ready = dict.fromkeys(everybody, LifeState.READY)
         before = await until(bus, lambda listed: states(listed) == ready, "all ready")
         assert before.complete
-        await first.bus.close()
+        await first.leave_bus()
         first.end("killed")
         gone_s = time.monotonic()
         async with live(Nameserver, hub):

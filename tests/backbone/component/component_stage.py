@@ -112,6 +112,8 @@ class Walker(Component[Gait]):
                 self.start_task(self.go_on(), "deaf")
             case "chain":
                 self.start_task(self.note_later(), "note")
+            case "close":
+                await self.bus.close()
             case "end":
                 self.end("poked")
         return Poked(self.pokes)

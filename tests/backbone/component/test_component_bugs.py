@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from pathlib import Path
 
 import pytest
 from component_stage import TOWER, Poke, Poked, Stage, TooSteep, live
@@ -16,7 +17,7 @@ from backbone.component.messages import (
     SetParameter,
 )
 from backbone.component.own_tasks import TASKS_END_WITHIN_S
-from backbone.errors import NoResponder
+from backbone.errors import LinkError, NoResponder
 from backbone.keys import Conversation
 from backbone.waiting import end_tasks
 
@@ -133,6 +134,22 @@ def test_failed_is_said_before_the_token_falls() -> None:
             await life
         await stage.clock.sleep_s(0.1)
         assert stage.observed == ["ready", "token", "draining", "failed", "no token"]
+
+    live(law())
+
+
+def test_an_answer_that_closes_the_components_bus_is_a_bug_with_its_line() -> None:
+    """Otherwise the component stays ready, and its mission only says that it cannot be reached."""
+
+    async def law() -> None:
+        stage = Stage()
+        life = await stage.begin()
+        with pytest.raises(LinkError):
+            await stage.ask(Poke("close"), Poked)
+        with pytest.raises(RuntimeError, match="only the end of a component closes its bus") as bug:
+            await life
+        assert stage.observed[-3:] == ["draining", "failed", "no token"]
+        assert "component_stage.py" in [Path(entry.path).name for entry in bug.traceback]
 
     live(law())
 

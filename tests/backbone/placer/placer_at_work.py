@@ -167,7 +167,7 @@ class Mission:
 
     async def crash(self, name: str) -> None:
         """End it as SIGKILL would: its tokens fall before anything else happens."""
-        await self._lives[name][0].bus.close()
+        await self._lives[name][0].leave_bus()
         await self.kill(name)
 
     def cut_off(self, host: str) -> None:

@@ -187,7 +187,7 @@ def test_a_death_is_an_alarm_and_a_good_end_is_none(stage: Callable[[Scene], Non
             dying = on.robot("scout2")
             async with on.beside(dying):
                 await on.until(lambda: on.model.team.component("scout2"))
-                await dying.bus.close()
+                await dying.leave_bus()
                 await on.until(on.model.alarm_views)
             [alarm] = on.model.alarm_views()
             assert (alarm.kind, alarm.subject) == (AlarmKind.LOST, "scout2")
