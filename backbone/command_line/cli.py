@@ -44,7 +44,7 @@ from backbone.command_line.standard_streams import can_redraw
 from backbone.command_line.tool_commands import bridge, metrics
 from backbone.command_line.tree_commands import tree
 from backbone.command_line.where import Where
-from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.endings import ExitCode, say, show
 from backbone.spoken import counted
 
 app = typer.Typer(
@@ -79,7 +79,7 @@ def or_exit(read: Callable[[], tuple[Any, bytes]]) -> tuple[Any, bytes]:
     try:
         return read()
     except MissionInvalid as invalid:
-        print(invalid)
+        show(map(str, invalid.faults))
         raise typer.Exit(int(ExitCode.MISSION_INVALID)) from None
 
 

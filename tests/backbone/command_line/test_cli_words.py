@@ -220,3 +220,10 @@ def test_without_a_mission_nothing_is_completed_and_nothing_complained_of(words:
     }
     done = CliRunner().invoke(app, [], env=environment, prog_name="scout-backbone")
     assert (done.output.strip(), done.exit_code) == ("", 0)
+
+
+@pytest.mark.parametrize("words", [["check"], ["up", "--headless"]])
+def test_the_name_of_a_file_with_faults_controls_no_terminal(words: list[str]) -> None:
+    done = CliRunner().invoke(app, [*words, "\x1b[31mred.xml"])
+    assert done.exit_code == ExitCode.MISSION_INVALID
+    assert done.stdout.startswith("\\x1b[31mred.xml:1:1: cannot be read: ")
