@@ -249,15 +249,18 @@ def _refusing_damage(name: object) -> Iterator[None]:
         yield
     except NotOfMessages as error:
         raise NotOfMessages(f"{name}: {error.detail}") from error
-    except DAMAGED as error:
+    except (*DAMAGED, OSError) as error:
         raise NoRecording(f"{name} is damaged: {error}") from error
 
 
 def wrong_begin(file: IO[bytes]) -> str:
     """Return why the file cannot be a recording, by its first bytes; empty: it may be one."""
     file.seek(0)
-    if file.read(len(_MAGIC)) == _MAGIC:
-        return ""
+    try:
+        if file.read(len(_MAGIC)) == _MAGIC:
+            return ""
+    except OSError as error:  # of a broken disc
+        return f"it cannot be read: {error.strerror or error}"
     return "it begins as another kind of file" if file.tell() else "the file is empty"
 
 
