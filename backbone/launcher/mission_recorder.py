@@ -47,7 +47,7 @@ class RecorderFailed(Refusal):
     """The mission cannot be recorded to this file."""
 
     code = "run.recorder"
-    remedy = "Name a new file in a folder where this user may write, or bring the mission up without --record."
+    remedy = "Name a new file in a folder where this user may write, or leave out --record."
 
 
 def require_new(path: Path) -> None:
