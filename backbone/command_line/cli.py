@@ -34,6 +34,7 @@ from backbone.command_line.options import (
     hub_endpoint,
     json_or_text,
     legal_name,
+    legal_names,
     named_value,
     run,
     run_table,
@@ -336,7 +337,9 @@ def creator(
     connect: Annotated[str, typer.Option("--connect", callback=hub_endpoint, help="The mission's hub, tcp/HOST:PORT.")],
     mission: Annotated[str, typer.Option("--mission", callback=legal_name, help="Name of the mission.")],
     secret_file: SecretFile = None,
-    tag: Annotated[list[str] | None, typer.Option("--tag", help="A tag of this machine; repeatable.")] = None,
+    tag: Annotated[
+        list[str] | None, typer.Option("--tag", callback=legal_names, help="A tag of this machine; repeatable.")
+    ] = None,
     record_to: Annotated[
         Path | None, typer.Option("--record", metavar="FILE.mcap", help="Record all messages of the components here.")
     ] = None,

@@ -9,7 +9,7 @@ from backbone.launcher.endings import ExitCode, say
 from backbone.launcher.kept_creator import Offered
 from backbone.launcher.mission_recorder import require_writable
 from backbone.launcher.offer import Offering
-from backbone.launcher.preconditions import require_process_table
+from backbone.launcher.preconditions import refuse_paths_of_no_message, require_process_table
 
 
 async def offer_this_machine(
@@ -20,6 +20,7 @@ async def offer_this_machine(
     is_file = secret_file is not None and str(secret_file) != "-"
     require_process_table()
     if record is not None:
+        refuse_paths_of_no_message(mission, record)
         require_writable(record)
     say(f"{host} is offered to mission {mission}; end with Ctrl-C")
     await Offering(offered, say, secret_file if is_file else None).run()

@@ -154,6 +154,11 @@ def legal_name(value: str | None) -> str | None:
         raise typer.BadParameter(str(illegal)) from None
 
 
+def legal_names(values: list[str] | None) -> list[str]:
+    """Refuse texts that are no names; for options that may be repeated, as a mission file's lists of names."""
+    return [str(legal_name(value)) for value in values or []]
+
+
 def shown_name(value: str) -> str:
     """Refuse a name that messages cannot contain, or that texts cannot show as it is; for names of anything."""
     if len(value) > LONGEST_NAME or not value.isprintable() or value != value.strip():

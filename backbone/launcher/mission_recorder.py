@@ -65,11 +65,11 @@ def require_writable(path: Path) -> None:
     """Return if a recording can begin in the first unused file of this series, else raise.
 
     Raises:
-        RecorderFailed: There is no such folder, or no such file can be made in it.
+        RecorderFailed: It is a folder or a device, there is no such folder, or no such file can be made in it.
     """
     folder = path.absolute().parent
-    if os.path.isdir(path):
-        raise RecorderFailed(f"{path} is a folder")
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise RecorderFailed(f"{path} is no regular file")
     if not os.path.isdir(folder):
         raise RecorderFailed(f"there is no folder {folder}")
     free = first_free(path)

@@ -116,10 +116,11 @@ HUB = ["--connect", "tcp/127.0.0.1:1"]
         (console_app, ["monitor", "--json", *HUB], "--mission"),
         (app, ["creator", *HUB, "--host", "field"], "--mission"),
         (app, ["creator", *HUB, "--mission", "m"], "--host"),
+        (app, ["creator", *HUB, "--mission", "m", "--host", "field", "--tag", "radio"], "--tag"),
     ],
-    ids=["status", "monitor", "creator of a mission", "creator on a host"],
+    ids=["status", "monitor", "creator of a mission", "creator on a host", "creator with tags"],
 )
-def test_a_name_that_no_mission_or_host_can_have_is_wrong_usage(
+def test_a_name_that_no_mission_host_or_tag_can_have_is_wrong_usage(
     command_line: Any, words: list[str], option: str, wrong: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for module in ("backbone.command_line.options", "backbone.command_line.cli", "ui_console.cli"):
@@ -127,6 +128,13 @@ def test_a_name_that_no_mission_or_host_can_have_is_wrong_usage(
     done = CliRunner().invoke(command_line, [*words, option, wrong])
     assert done.exit_code == 2
     assert "legal name" in " ".join(done.output.split())
+
+
+def test_a_machine_whose_recording_no_message_can_name_is_not_offered(tmp_path: Path) -> None:
+    path = os.fsdecode(os.fsencode(tmp_path) + b"/r\xfcbe.mcap")
+    done = CliRunner().invoke(app, ["creator", *HUB, "--mission", "m", "--host", "field", "--record", path])
+    assert done.exit_code == ExitCode.NO_BACKBONE
+    assert "refused [run.path]: the path " in done.output
 
 
 @pytest.mark.parametrize(

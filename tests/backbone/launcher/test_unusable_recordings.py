@@ -14,8 +14,9 @@ UNUSABLE = {
     f"{'n' * 5000}/night.mcap": "there is no folder ",
     "nights/night.mcap": "there is no folder ",
     "night.mcap/night.mcap": "there is no folder ",
-    ".": " is a folder",
-    "/": " is a folder",
+    ".": " is no regular file",
+    "/": " is no regular file",
+    "/dev/null": " is no regular file",
 }
 
 
