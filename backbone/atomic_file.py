@@ -83,6 +83,8 @@ def write_all(descriptor: int, content: bytes) -> None:
 
 
 def _beside(target: Path) -> Path:
+    if not target.name:  # the root, or the folder of this process
+        raise OSError(errno.EINVAL, "it is no regular file")
     return target.with_name(f".{target.name}.saving")
 
 

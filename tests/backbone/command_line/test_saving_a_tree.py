@@ -23,7 +23,7 @@ def test_a_symbolic_link_stays_one_and_its_file_has_the_tree(tmp_path: Path) -> 
 def test_what_is_no_file_is_refused_and_stays(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    for target in (pipe, tmp_path):
+    for target in (pipe, tmp_path, Path("/"), Path(".")):
         with pytest.raises(FileUnusable, match=f"{target} cannot be written: it is no regular file"):
             write_mission(target, b"new")
     assert pipe.is_fifo()
