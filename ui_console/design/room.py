@@ -90,7 +90,7 @@ class DesignRoom:
         self._kept, self._look_up = kept, look_up
         self._facts = dict(shipped_classes())
         self._trusted = _classes_of(draft.saved)
-        self._turn = asyncio.Lock()
+        self._turn, self._disk = asyncio.Lock(), asyncio.Lock()
         self._sections: dict[str, bytes] = {}
         self._rehearsal: tuple[int, RehearsalView | None] = (0, None)
         self._to_keep = asyncio.Event()
@@ -175,13 +175,14 @@ class DesignRoom:
 
     async def _save(self, client: Designer, intent: SaveFile) -> None:
         self._must_be(intent.revision)
-        path = sibling_file(self.draft.source, intent.name)
+        before = self.draft.source
+        path = sibling_file(before, intent.name)
         kept = await asyncio.to_thread(save, self.draft, path, overwrite=intent.overwrite)
-        if kept.source != self.draft.source:
-            await self._keep(self.draft.kept(self.draft.source))  # saved elsewhere, so no draft file is needed
-            self._kept = DraftFile(kept.source)
         await self._show(kept, client.welcome.user)
-        await self._keep(kept)
+        await self._keep()
+        if kept.source != before:
+            self._kept = DraftFile(kept.source)
+            await self._keep()
         client.answer(SavedAnswer(kept.source, len(kept.problems)))
 
     def _must_be(self, revision: int) -> None:
@@ -207,28 +208,28 @@ class DesignRoom:
         self._to_keep.clear()
 
     async def keep_on(self) -> None:
-        """Write the draft file whenever the draft has changed; until cancelled."""
+        """Write the draft file whenever the draft has changed; until cancelled. No change waits for the disk."""
         while True:
             await self._to_keep.wait()
-            async with self._turn:
-                self._to_keep.clear()
-                await self._keep(self.draft)
+            self._to_keep.clear()
+            await self._keep()
 
     async def keep_now(self) -> None:
         """Write the draft file for the present draft; for an unchanged draft, remove it."""
         if self.revision > 1:
-            await self._keep(self.draft)
+            await self._keep()
 
-    async def _keep(self, draft: Draft) -> None:
-        if self._keeping is not None:
-            await asyncio.wait({self._keeping})  # its task continues if its caller was cancelled
-        self._keeping = asyncio.create_task(asyncio.to_thread(self._kept.keep, draft), name="design: keep")
-        try:
-            await asyncio.shield(self._keeping)
-        except DraftNotKept as refusal:
-            log.warning("%s", refusal)
-            for client in self.clients:
-                client.answer(NoticeAnswer(refusal.detail, refusal.remedy))
+    async def _keep(self) -> None:
+        async with self._disk:
+            if self._keeping is not None:
+                await asyncio.wait({self._keeping})  # its task continues if its caller was cancelled
+            self._keeping = asyncio.create_task(asyncio.to_thread(self._kept.keep, self.draft), name="design: keep")
+            try:
+                await asyncio.shield(self._keeping)
+            except DraftNotKept as refusal:
+                log.warning("%s", refusal)
+                for client in self.clients:
+                    client.answer(NoticeAnswer(refusal.detail, refusal.remedy))
 
     async def _learn(self, class_paths: Sequence[str]) -> None:
         await self._known(await self._look_up(class_paths))

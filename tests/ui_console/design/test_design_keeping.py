@@ -1,14 +1,19 @@
-"""The draft file: unsaved changes survive, and belong to one designer."""
+"""The draft file: unsaved changes survive, belong to one designer, and let no other change wait."""
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import json
+import threading
 from pathlib import Path
 
 import pytest
+from design_stage import WITHIN_S, serving
 from design_tutorial import tutorial_draft
 
+from backbone.atomic_file import replace_file
+from ui_console.design import keeping
 from ui_console.design.draft import Draft
 from ui_console.design.effects import set_value
 from ui_console.design.file import FileChanged, save
@@ -62,6 +67,55 @@ def test_another_designers_draft_is_left_alone(tmp_path: Path) -> None:
 def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
     with pytest.raises(DraftNotKept, match="No such file"):
         DraftFile(str(tmp_path / "gone" / "guard.xml")).keep(Draft.new("guard.xml"))
+
+
+class SlowDisk:
+    """A disk that takes its time to write.
+
+    Attributes:
+        asked: Set when it is to write.
+        may_write: Until it is set, nothing is written.
+    """
+
+    def __init__(self) -> None:
+        self.asked, self.may_write = threading.Event(), threading.Event()
+
+    def replace_file(self, target: Path, content: bytes) -> None:
+        self.asked.set()
+        assert self.may_write.wait(4 * WITHIN_S)
+        replace_file(target, content)
+
+
+@pytest.fixture
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> SlowDisk:
+    disk = SlowDisk()
+    monkeypatch.setattr(keeping, "replace_file", disk.replace_file)
+    return disk
+
+
+async def test_no_change_waits_until_an_earlier_one_is_on_the_disk(file: Path, slow_disk: SlowDisk) -> None:
+    async with serving(file) as served, served.page() as anna:
+        try:
+            await anna.change(do="set", path=[], name="priority", value="11")
+            assert await asyncio.to_thread(slow_disk.asked.wait, WITHIN_S)
+            await anna.change(do="undo")
+            await anna.change(do="redo")
+        finally:
+            slow_disk.may_write.set()
+    resumed = DraftFile(str(file)).resume()
+    assert resumed is not None
+    assert resumed.mission.text("priority") == "11"
+
+
+async def test_a_save_waits_for_the_disk_and_leaves_no_draft_file(file: Path, slow_disk: SlowDisk) -> None:
+    async with serving(file) as served, served.page() as anna:
+        await anna.change(do="set", path=[], name="priority", value="11")
+        assert await asyncio.to_thread(slow_disk.asked.wait, WITHIN_S)
+        saving = asyncio.create_task(anna.change(do="save", name="night.xml"))
+        await anna.wait(lambda: not anna.view["status"]["is_changed"], "saved")
+        slow_disk.may_write.set()
+        await saving
+        assert sorted(one.name for one in file.parent.iterdir()) == ["guard.xml", "night.xml"]
 
 
 def encoded(text: bytes) -> str:
