@@ -4,6 +4,8 @@ import { fits } from "./link.js";
 
 /** @import { DraftChange, MakeChange } from "./design_types.d.ts" */
 
+const LOOK = "When it is connected again, look at the mission, and repeat the change if you still want it.";
+
 /**
  * Sends a change as soon as the previous one is done, and creates it only then. It is meant for the draft that its
  * author saw, with this page's own changes before it: if another designer changed the draft meanwhile, the server
@@ -51,8 +53,9 @@ export class Changes {
     this.pump();
   }
 
-  /** The connection ended: drop all changes. */
+  /** The connection ended: drop all changes. The server may have carried out the one underway. */
   drop() {
+    if (this.underway !== null) this.refused("NOT CONNECTED: it is not known whether this was done", LOOK);
     this.underway = null;
     this.waiting.length = 0;
     this.busy(false);
@@ -79,6 +82,7 @@ export class Changes {
       }
       if (this.say(this.underway)) return;
       this.refused("NOT CONNECTED: this was not done", "");
+      this.underway = null;
       this.drop();
     }
   }

@@ -51,6 +51,18 @@ test("without a connection the change is refused, and what waits is forgotten", 
   assert.equal(on.said.length, 1);
 });
 
+test("a change whose answer is lost with the connection is told, and only once", () => {
+  const on = stage();
+  on.changes.add(() => ({ do: "undo" }));
+  on.changes.add(() => ({ do: "redo" }));
+  on.changes.drop();
+  on.changes.drop();
+  assert.deepEqual(on.refusals, ["NOT CONNECTED: it is not known whether this was done"]);
+  assert.equal(on.isBusy, false);
+  on.changes.add(() => ({ do: "undo" }));
+  assert.equal(on.said.length, 2);
+});
+
 test("a change that is longer than the server reads is refused, and the next one goes out", () => {
   const on = stage();
   on.changes.add(() => ({ do: "set", path: [], name: "name", value: "ä".repeat(2100), is_parameter: false }));
