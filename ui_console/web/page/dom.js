@@ -140,3 +140,14 @@ export function keepingFocus(root, draw) {
   draw();
   if (key) query(root, `[data-key="${CSS.escape(key)}"]`, HTMLElement)?.focus();
 }
+
+/**
+ * Keeps the height of an element in a variable of the page's styles.
+ *
+ * @param {HTMLElement} element
+ * @param {string} variable
+ */
+export function followHeight(element, variable) {
+  const told = () => document.documentElement.style.setProperty(variable, `${element.offsetHeight}px`);
+  new ResizeObserver(told).observe(element);
+}

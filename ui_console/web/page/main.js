@@ -4,7 +4,7 @@ import { Blindness } from "./blind.js";
 import { BusKeys } from "./bus.js";
 import { Cards } from "./cards.js";
 import { Commands } from "./commands.js";
-import { find, queryAll } from "./dom.js";
+import { find, followHeight, queryAll } from "./dom.js";
 import { Confirmations } from "./drawn.js";
 import { Driving } from "./driving.js";
 import { Hand } from "./hand.js";
@@ -103,6 +103,8 @@ new Keys({
   does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")),
 });
 followTheme(find("theme", HTMLSelectElement));
+followHeight(find("header"), "--header");
+followHeight(find("hand"), "--hand");
 
 // ---------------------------------------------------------------- login
 const login = new Login({ form: find("login", HTMLFormElement), enter: (hello) => link.open(hello) });

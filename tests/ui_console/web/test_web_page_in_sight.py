@@ -1,0 +1,82 @@
+"""On a phone the driver sees picture, pad and stop buttons at once, whatever else the page shows."""
+
+from __future__ import annotations
+
+import pytest
+from known_arcs import lit_types
+from web_page import page_at, take, wait_free, wait_stopped
+from web_stage import LOW, Stage
+
+from backbone.component.abilities import Abilities, CommandForm, FieldForm, ValueKind
+from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
+from backbone.naming import Subsystem
+from resource_pool.arcs.drive import DriveArc
+from resource_pool.arcs.skeleton import LitDriveArc
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
+
+PHONES = [(360, 640), (390, 844), (844, 390), (640, 360)]
+MANY = Abilities(
+    commands=[
+        *DriveArc.abilities().commands,
+        *(
+            CommandForm(f"show_{word}", [FieldForm("steps", ValueKind.WHOLE, least=1, most=9)], roles=["scout"])
+            for word in ("one", "two", "three", "four")
+        ),
+    ]
+)
+HARDWARE = [Resource(f"{kind}1", kind) for kind in LitDriveArc.kinds().values()]
+
+OUT_OF_SIGHT = """async ([isAll, more]) => {
+  const grow = () => {
+    for (const id of ["lost", "consent", "orders", "let-go", "health"]) document.getElementById(id).hidden = false;
+    for (const id of ["taken", "lost-line", "consent-line", "asked", "own", "health", "applied"])
+      document.getElementById(id).textContent = "anna asks for scout1, because hers has no radio link. ".repeat(3);
+    const line = document.createElement("span");
+    line.textContent = "alarm: launcher is absent: it is silent, so what is shown may be old. ".repeat(9);
+    document.getElementById("alarm-bar").replaceChildren(line);
+  };
+  for (let frames = 0; frames < 3; frames += 1) {
+    if (isAll) grow(); // the server's next message undoes it
+    scrollTo(0, 0);
+    await new Promise(requestAnimationFrame);
+  }
+  const needed = {
+    picture: document.querySelector(".robot.is-large canvas"),
+    ...Object.fromEntries(["pad", "stop-mine", "stop-all", ...more].map((id) => [id, document.getElementById(id)])),
+  };
+  const isSeen = (one) => {
+    const { left, top, right, bottom } = one.getBoundingClientRect();
+    const [x, y] = [(left + right) / 2, (top + bottom) / 2];
+    const points = [[x, y], [left + 9, y], [right - 9, y], [x, top + 3], [x, bottom - 3]];
+    const whole = one.closest(".screen") ?? one;
+    return bottom - top > 30 && points.every((point) => whole.contains(document.elementFromPoint(...point)));
+  };
+  return Object.entries(needed).filter(([, one]) => !isSeen(one)).map(([name]) => name);
+}"""
+
+
+@pytest.mark.parametrize(("width", "height"), PHONES)
+async def test_commands_and_news_cover_neither_picture_nor_pad_nor_stops(stage: Stage, width: int, height: int) -> None:
+    stage.know_commands(
+        [
+            ComponentType("capture", "x:Y", Subsystem.RESOURCE_POOL, needs=DriveArc.kinds(), abilities=MANY),
+            *lit_types("lit_drive"),
+        ],
+        HARDWARE,
+    )
+    async with page_at(stage, "phone", may_be_kept=False) as page, stage.browser(LOW) as ben:
+        await page.set_viewport_size({"width": width, "height": height})
+        await take(page)
+        await page.locator("#commands").wait_for(state="attached")
+        assert await page.evaluate(OUT_OF_SIGHT, [False, []]) == [], "with commands"
+        assert await page.evaluate(OUT_OF_SIGHT, [True, []]) == [], "with all news"
+        await page.locator("#stop-mine").click()
+        await wait_stopped(page)
+        await ben.say(do="lift", robot="scout1", number=stage.robots["scout1"].latch.state.number)
+        await page.locator("#consent-line").get_by_text("ben asks").wait_for()
+        assert await page.evaluate(OUT_OF_SIGHT, [False, ["consent-yes", "consent-no"]]) == [], "with a question"
+        await page.locator("#consent-yes").click()
+        await wait_free(page)
+        await page.get_by_role("button", name="Show four").click(trial=True)
