@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from known_arcs import lit_types
+from web_browser import assert_no_sideways_scroll
 from web_page import page_at, take, wait_free, wait_stopped
 from web_stage import LOW, Stage
 
@@ -16,6 +17,7 @@ from resource_pool.arcs.skeleton import LitDriveArc
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
+LONGEST = "scout-of-the-second-team-with-the-longest-name-that-is-possible"
 PHONES = [(360, 640), (390, 844), (844, 390), (640, 360)]
 MANY = Abilities(
     commands=[
@@ -59,6 +61,7 @@ OUT_OF_SIGHT = """async ([isAll, more]) => {
 
 @pytest.mark.parametrize(("width", "height"), PHONES)
 async def test_commands_and_news_cover_neither_picture_nor_pad_nor_stops(stage: Stage, width: int, height: int) -> None:
+    stage.place_robots("scout1", LONGEST)
     stage.know_commands(
         [
             ComponentType("capture", "x:Y", Subsystem.RESOURCE_POOL, needs=DriveArc.kinds(), abilities=MANY),
@@ -68,15 +71,16 @@ async def test_commands_and_news_cover_neither_picture_nor_pad_nor_stops(stage: 
     )
     async with page_at(stage, "phone", may_be_kept=False) as page, stage.browser(LOW) as ben:
         await page.set_viewport_size({"width": width, "height": height})
-        await take(page)
+        await take(page, LONGEST)
         await page.locator("#commands").wait_for(state="attached")
+        await assert_no_sideways_scroll(page)
         assert await page.evaluate(OUT_OF_SIGHT, [False, []]) == [], "with commands"
         assert await page.evaluate(OUT_OF_SIGHT, [True, []]) == [], "with all news"
         await page.locator("#stop-mine").click()
-        await wait_stopped(page)
-        await ben.say(do="lift", robot="scout1", number=stage.robots["scout1"].latch.state.number)
+        await wait_stopped(page, LONGEST)
+        await ben.say(do="lift", robot=LONGEST, number=stage.robots[LONGEST].latch.state.number)
         await page.locator("#consent-line").get_by_text("ben asks").wait_for()
         assert await page.evaluate(OUT_OF_SIGHT, [False, ["consent-yes", "consent-no"]]) == [], "with a question"
         await page.locator("#consent-yes").click()
-        await wait_free(page)
+        await wait_free(page, LONGEST)
         await page.get_by_role("button", name="Show four").click(trial=True)

@@ -3,7 +3,7 @@
 import { find } from "./dom.js";
 import { remembered } from "./memory.js";
 import { atStick } from "./orders.js";
-import { lasting, set } from "./text.js";
+import { lasting, set, shortened } from "./text.js";
 
 /** @import { Commands } from "./commands.js" */
 /** @import { Driving } from "./driving.js" */
@@ -11,6 +11,7 @@ import { lasting, set } from "./text.js";
 /** @import { Act } from "./types.d.ts" */
 
 const MEMORY = "held";
+const NAME_ON_BUTTON = 16; // chosen: letters, two lines on a phone
 const READ_MS = 700; // chosen: longer than a double press, shorter than it takes to read a question
 
 /** Shows `own` of the view; `act(what, name)` carries out a person's action. */
@@ -171,7 +172,8 @@ export class Hand {
     find("release", HTMLButtonElement).disabled = !own.is_asked && stick === "";
     find("halt", HTMLButtonElement).disabled = stick === "";
     find("stop-mine").hidden = stick === "";
-    set(find("stop-mine"), `Stop ${stick}`);
+    set(find("stop-mine"), `Stop ${shortened(stick, NAME_ON_BUTTON)}`);
+    find("stop-mine").setAttribute("aria-label", `Stop ${stick}`);
   }
 
   /** Show the lost robot with time and reason, and offer it again: by the server's report, else by this page's own. */
