@@ -12,7 +12,7 @@ const LOOK_EVERY_MS = 100;
 const OLD_MS = 800; // chosen: with the checks in between, the warning appears before the content is a second old
 const SILENT_MS = 2000; // chosen: eight beats without return; browsers do not report the loss of a network
 const ANSWER_MS = 10000; // chosen: as long as the server waits for a request and a token
-const NOT_LET_IN = 1008;
+const NOT_LET_IN = [1007, 1008, 1009]; // a token or a name that is too long or wrong
 const MOST_BYTES = 4096; // the server's limit
 
 /**
@@ -106,7 +106,7 @@ export class Link {
       if (socket !== this.socket) return;
       this.socket = null;
       clearTimeout(this.timer);
-      if (event.code === NOT_LET_IN && !this.isUp) this.become("refused", event.reason);
+      if (NOT_LET_IN.includes(event.code) && !this.isUp) this.become("refused", event.reason);
       else this.again(event.reason || "no connection to the server");
     };
   }

@@ -61,10 +61,13 @@ test("a server that answered is not given up while it answers", () => {
   assert.equal(SilentSocket.made.length, 1);
 });
 
-test("a wrong token is not tried again", () => {
-  const link = opened();
-  SilentSocket.made[0].onclose({ code: 1008, reason: "wrong token" });
-  mock.timers.tick(2 * WAITS_MS);
-  assert.equal(link.is, "refused");
-  assert.equal(SilentSocket.made.length, 1);
-});
+const WRONG = { "a wrong token": 1008, "a token that is too long": 1009, "a name that is too long": 1007 };
+for (const [what, code] of Object.entries(WRONG)) {
+  test(`${what} is not tried again`, () => {
+    const link = opened();
+    SilentSocket.made[0].onclose({ code, reason: "why" });
+    mock.timers.tick(2 * WAITS_MS);
+    assert.equal(link.is, "refused");
+    assert.equal(SilentSocket.made.length, 1);
+  });
+}
