@@ -278,6 +278,22 @@ async def test_a_value_that_is_lost_with_the_connection_is_told_and_enter_sends_
 
 
 @pytest.mark.thorough
+async def test_a_long_value_widens_no_pane_and_one_that_is_too_long_is_refused_once(tmp_path: Path) -> None:
+    with served(tmp_path / "guard.xml") as address:
+        async with page_at("desktop", address) as page:
+            name = page.locator("#properties [data-key='name']")
+            await name.fill("n" * 300)
+            await name.press("Enter")
+            await page.locator("#target-shown").get_by_text("n" * 300).wait_for()
+            await assert_no_sideways_scroll(page)
+            await name.fill("n" * 10_000)
+            await name.press("Enter")
+            await page.locator("#properties .refused").get_by_text("too long for the page").wait_for()
+            await name.blur()
+            assert await page.locator("#notices p").count() == 1
+
+
+@pytest.mark.thorough
 async def test_enter_sets_what_is_written_and_the_focus_stays(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     file.write_bytes((ROOT / "mission.xml").read_bytes())

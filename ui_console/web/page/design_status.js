@@ -43,14 +43,16 @@ export function showPeople(people, user) {
 }
 
 /**
- * Show a notice until the person closes it, or newer ones need its place.
+ * Show a notice until the person closes it, or newer ones need its place; the same one again replaces it.
  *
  * @param {string} text
  * @param {string} remedy
  * @param {"bad" | "good"} [kind]
  */
 export function notice(text, remedy, kind = "bad") {
-  const root = find("notices");
-  root.append(makeNotice(kind, remedy ? `${text} (${remedy})` : text));
+  const root = find("notices"),
+    made = makeNotice(kind, remedy ? `${text} (${remedy})` : text);
+  for (const one of [...root.children]) if (one.textContent === made.textContent) one.remove();
+  root.append(made);
   while (root.children.length > NOTICES) root.children[0].remove();
 }
