@@ -16,7 +16,7 @@ import web_browser
 from axe import serious_findings
 from design_hands import BIN, ROOT, Finger, Hands, Mouse, build_by_tutorial, served
 from design_tutorial import tutorial_draft
-from web_browser import Cable, assert_no_sideways_scroll
+from web_browser import SIZES, Cable, assert_no_sideways_scroll
 
 from ui_console.design.keeping import path_of_draft
 
@@ -40,6 +40,23 @@ PRESS_AFTER_DRAG = """(handle) => {
   return heard;
 }"""
 """All in one task of the page, as on a busy device: no timer is served between the drag and the press."""
+
+BUTTONS_MOVED = """() => {
+  const places = () =>
+    [...document.querySelectorAll("header button, #panes button, #below-tabs button")].map((one) => {
+      const { x, y } = one.getBoundingClientRect();
+      return `${one.textContent} ${x} ${y}`;
+    });
+  const before = places();
+  const words = {
+    state: "changed, 12 problems",
+    people: "with ben, somebody-with-a-rather-long-name",
+    link: "NOT CONNECTED: no connection to the server",
+  };
+  for (const [id, text] of Object.entries(words)) document.getElementById(id).textContent = text;
+  return places().filter((one) => !before.includes(one));
+}"""
+"""Buttons in other places after words of the header have become longer."""
 
 SHOWN_AGAIN = """async (dialog) => {
   const dialogs = await import("./design_dialogs.js");
@@ -144,6 +161,13 @@ async def test_the_click_of_a_press_right_after_a_drag_counts(tmp_path: Path) ->
         async with page_at("tablet", address) as page:
             handle = Mouse(page).part("behavior patrol").locator(".handle")
             assert await handle.evaluate(PRESS_AFTER_DRAG) == ["drag", "press"]
+
+
+@pytest.mark.parametrize("size", SIZES)
+async def test_no_word_of_the_header_moves_a_button(tmp_path: Path, size: str) -> None:
+    with served(tmp_path / "guard.xml") as address:
+        async with page_at(size, address) as page:
+            assert await page.evaluate(BUTTONS_MOVED) == []
 
 
 @pytest.mark.thorough
