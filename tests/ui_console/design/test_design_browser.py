@@ -9,14 +9,13 @@ from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import pytest
 import web_browser
 from axe import serious_findings
 from design_hands import BIN, ROOT, Finger, Hands, Mouse, build_by_tutorial, served
 from design_tutorial import tutorial_draft
-from web_browser import SIZES, Cable, assert_no_sideways_scroll
+from web_browser import SIZES, assert_no_sideways_scroll
 
 from ui_console.design.keeping import path_of_draft
 
@@ -277,28 +276,6 @@ async def test_a_refused_value_stays_marked_where_it_was_written_and_escape_take
             assert await field.input_value() == "scout2"
             assert await field.get_attribute("aria-invalid") is None
             await Hands(page).is_state("saved, fine")
-
-
-@pytest.mark.thorough
-async def test_a_value_that_is_lost_with_the_connection_is_told_and_enter_sends_it_again(tmp_path: Path) -> None:
-    with served(tmp_path / "guard.xml") as address:
-        port = urlsplit(address).port
-        assert port is not None
-        async with (
-            Cable(port).plugged_in() as cable,
-            page_at("desktop", address.replace(f":{port}/", f":{cable.port}/")) as page,
-        ):
-            field = page.locator("#properties [data-key='priority']")
-            await field.fill("11")
-            cable.is_cut = True
-            await field.press("Enter")
-            await page.locator("#link").get_by_text("NOT CONNECTED").wait_for()
-            await page.locator("#notices").get_by_text("it is not known whether this was done").wait_for()
-            cable.is_cut = False
-            await page.locator("#link").get_by_text("connected", exact=True).wait_for()
-            assert await field.input_value() == "11"
-            await field.press("Enter")
-            await page.wait_for_selector("#tree [data-told$='priority 11']")
 
 
 @pytest.mark.thorough

@@ -107,6 +107,7 @@ function changed({ is, why }) {
 function came() {
   wasDown = false;
   choice.begin();
+  choice.choose(tree.at); // the server begins with the mission itself
   find("designer").hidden = false;
   if (!find("minute").hidden) link.say({ do: "rehearse", is_shown: true });
 }
@@ -123,9 +124,9 @@ function heard(message) {
   if (news.palette) palette.show(news.palette);
   if (news.problems) showAllProblems(news.problems);
   const { element } = choice;
-  if (element && (news.element || news.selected !== undefined)) showChosen(element);
-  if (view.element && (news.element || news.tree))
-    details.show(view.element, tree.row(view.element.path)?.problems ?? []);
+  const isChosen = news.element !== undefined || news.selected !== undefined;
+  if (element && isChosen) showChosen(element);
+  if (element && (isChosen || news.tree)) details.show(element, tree.row(element.path)?.problems ?? []);
   if ("rehearsal" in news) showMinute(find("minute"), news.rehearsal);
   if (news.people) showPeople(news.people, view.welcome?.user);
   if (news.status) showStatus(news.status);
