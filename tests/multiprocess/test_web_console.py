@@ -220,6 +220,7 @@ async def test_on_a_phone_that_loses_its_network_the_wheels_stop_and_the_behavio
         await page.wait_for_selector(".robot[data-robot=scout1]:not(.is-stale)")
         finger = Finger(page)
         await hold_until(page, finger.push_right, finger.lift, moved(bus, before), "the pose changed")
+        await page.evaluate("() => scrollTo(0, 0)")
         await keep_picture(page, "phone")
         cable.is_cut = True  # the finger stays where it is
         await wait_still(bus)
