@@ -1,8 +1,9 @@
-"""On a phone the driver sees picture, pad and stop buttons at once, whatever else the page shows."""
+"""On a phone or a tablet the driver sees picture, pad and stop buttons at once, whatever else the page shows."""
 
 from __future__ import annotations
 
 import pytest
+from examples import rest_thorough
 from known_arcs import lit_types
 from web_browser import assert_no_sideways_scroll
 from web_page import page_at, take, wait_free, wait_stopped
@@ -18,7 +19,7 @@ from resource_pool.arcs.skeleton import LitDriveArc
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
 LONGEST = "scout-of-the-second-team-with-the-longest-name-that-is-possible"
-PHONES = [(360, 640), (390, 844), (844, 390), (640, 360)]
+SCREENS = [(360, 640), (844, 390), (768, 1024), (390, 844), (640, 360), (820, 1180)]
 MANY = Abilities(
     commands=[
         *DriveArc.abilities().commands,
@@ -59,7 +60,7 @@ OUT_OF_SIGHT = """async ([isAll, more]) => {
 }"""
 
 
-@pytest.mark.parametrize(("width", "height"), PHONES)
+@pytest.mark.parametrize(("width", "height"), rest_thorough(SCREENS, 3))
 async def test_commands_and_news_cover_neither_picture_nor_pad_nor_stops(stage: Stage, width: int, height: int) -> None:
     stage.place_robots("scout1", LONGEST)
     stage.know_commands(
