@@ -44,7 +44,7 @@ from backbone.scheduling.trace_writer import TraceWriter
 from backbone.scheduling.transitions import Transitions
 from backbone.scheduling.whole_group import WholeGroupPlanner
 
-FORM = 7
+FORM = 8
 """Grows when snapshots of an earlier release can no longer be read."""
 _OBJECTS: dict[str, type[Any]] = {
     kind.__name__: kind
