@@ -158,8 +158,7 @@ class ConsoleModel:
 
     def own(self, now_s: float) -> views.OwnView:
         """Return the robot that this console wants and holds, with its state."""
-        held = self.held
-        link_down_s = self.team.links.down_s(now_s)
+        held, link_down_s = self.held, self.team.links.down_s(now_s)
         return views.OwnView(
             console=self.name,
             user=self.user,
@@ -181,6 +180,7 @@ class ConsoleModel:
             link_down_s=link_down_s,
             moment=self.moment,
             orders=self.team.people.named_all(self.orders.views(now_s)),
+            is_unsure=held is not None and self._confirmed_s < self.team.links.back_s,
         )
 
     @property

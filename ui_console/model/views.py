@@ -334,6 +334,7 @@ class OwnView(msgspec.Struct, frozen=True):
         link_down_s: Time from which the mission's hub is silent; negative: the link is up.
         moment: Grows with each stop, lift, grant and loss; a press that began at an earlier moment moves nothing.
         orders: The operator's orders, by robot.
+        is_unsure: True: the robot was held before the link was cut; its ARC has not confirmed that it still is.
     """
 
     console: str
@@ -356,6 +357,7 @@ class OwnView(msgspec.Struct, frozen=True):
     link_down_s: float = NONE_S
     moment: int = 0
     orders: list[OrderView] = []
+    is_unsure: bool = False
 
 
 class HealthView(msgspec.Struct, frozen=True):

@@ -75,7 +75,7 @@ def head(view: ConsoleView, columns: int, profile: Profile, speed: float) -> Hea
 def _facts(view: ConsoleView, profile: Profile, speed: float) -> Iterator[_Fact]:
     own = view.own
     is_alarming = own.stop is not None or own.link_down_s >= 0
-    style = ALARMING if is_alarming else "bold black on green" if own.is_held else "bold"
+    style = ALARMING if is_alarming else "bold black on green" if own.is_held and not own.is_unsure else "bold"
     short, _, reason = own.status.partition(": ")
     yield _Fact(9, Text(f" {own.status} ", style), Text(f" {short}{'…' if reason else ''} ", style))
     if view.health is not None:

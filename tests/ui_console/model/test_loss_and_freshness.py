@@ -15,6 +15,7 @@ from ui_console.model.views import AlarmKind, LostView
 from ui_console.session.feed import LINK_FRESH_S
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.display import LINK_LOOK_S
+from ui_console.terminal.head import head
 
 AWAY = GivenBack(20.0, "anna is away", True, wanted=False)
 
@@ -111,8 +112,10 @@ def test_after_a_cut_the_first_line_says_what_it_does_not_know_until_the_arc_con
     for at_s in (14.0, 14.3):
         shown.apply(LinkHeard(at_s, True, 0.002, until_s=at_s + 0.8))
         assert shown.status_line(at_s) == "the link is back; not yet known whether you still hold scout1"
+        assert "green" not in str(head(shown.view(at_s), 160, Profile.TERMINAL, 0.25).status.spans)
     shown.apply(HoldConfirmed(14.5))
     assert shown.status_line(14.5).startswith("you hold scout1")
+    assert "green" in str(head(shown.view(14.5), 160, Profile.TERMINAL, 0.25).status.spans)
 
 
 def test_what_has_to_be_let_go_is_said_only_while_a_robot_is_held() -> None:

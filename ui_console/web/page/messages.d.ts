@@ -347,6 +347,7 @@ export interface OwnView {
   link_down_s: number;
   moment: number;
   orders: OrderView[];
+  is_unsure: boolean;
 }
 
 export interface ParameterView {
