@@ -60,6 +60,12 @@ OUT_OF_SIGHT = """async ([isAll, more]) => {
 }"""
 
 
+IS_IN_SIGHT = """(one) => {
+  const box = one.getBoundingClientRect();
+  return one.contains(document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2));
+}"""
+
+
 @pytest.mark.parametrize(("width", "height"), rest_thorough(SCREENS, 3))
 async def test_commands_and_news_cover_neither_picture_nor_pad_nor_stops(stage: Stage, width: int, height: int) -> None:
     stage.place_robots("scout1", LONGEST)
@@ -85,3 +91,14 @@ async def test_commands_and_news_cover_neither_picture_nor_pad_nor_stops(stage: 
         await page.locator("#consent-yes").click()
         await wait_free(page, LONGEST)
         await page.get_by_role("button", name="Show four").click(trial=True)
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (360, 640)])
+async def test_on_an_upright_phone_no_scrolling_takes_pad_and_stops_away(stage: Stage, width: int, height: int) -> None:
+    async with page_at(stage, "phone", may_be_kept=False) as page:
+        await page.set_viewport_size({"width": width, "height": height})
+        await take(page)
+        for end in (0, 500, 100_000):
+            await page.evaluate("end => scrollTo(0, end)", end)
+            for control in ("pad", "stop-mine", "stop-all"):
+                assert await page.locator(f"#{control}").evaluate(IS_IN_SIGHT), f"{control}, from {end}"
