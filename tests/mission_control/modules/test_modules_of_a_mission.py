@@ -29,7 +29,7 @@ GIVEN = '<given key="number" class="sample_modules:Number" address="ui_console/t
 def _arranged_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Ask the modules' classes in this process: no interpreter starts for it, as it does for other tests."""
 
-    def printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
+    def printed(what: str, about: Sequence[str], _late: str) -> tuple[list[bytes], str]:
         assert what == "arrange"
         questions = [msgspec.json.decode(one, type=UnitsQuestion) for one in about]
         return [msgspec.json.encode(class_probe.arranged(one)) for one in questions], ""

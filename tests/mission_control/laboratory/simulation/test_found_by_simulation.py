@@ -20,7 +20,7 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
     "an RC whose return was not heard of is there all the same": (
         136,
         [
-            MessageFault("backbone/nameserver > backbone/rc_manager Appeared 11", "lost"),
+            MessageFault("backbone/nameserver > backbone/rc_manager Appeared 4", "lost"),
             KillFault(3.712, "video2", 1.397),
             KillFault(5.064, "console1-drive", 0.69),
             KillFault(6.786, "radio1", 0.597),
@@ -42,7 +42,7 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
     ),
     "a request that was lost is asked for when its ARC beats": (
         9,
-        [MessageFault("resource_pool/behavior2-video_drive > backbone/rc_manager SchedulingRequest 2", "lost")],
+        [MessageFault("resource_pool/behavior2-video_drive > backbone/rc_manager SchedulingRequest 1", "lost")],
     ),
     "RCs that are freed late make no turn a forgotten one": (
         1085,
@@ -71,7 +71,7 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
         [
             MessageFault("mission_control/behavior4 > resource_pool/behavior4-video_drive answer Noted 21", "lost"),
             MessageFault("mission_control/behavior4 > resource_pool/behavior4-video_drive answer Noted 28", "lost"),
-            MessageFault("backbone/rc_manager > resource_pool/behavior4-video_drive CloseGate 3", "lost"),
+            MessageFault("backbone/rc_manager > resource_pool/behavior4-video_drive CloseGate 2", "lost"),
         ],
     ),
     "an ARC that is taken for the one before it asks anew": (
