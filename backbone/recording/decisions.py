@@ -194,21 +194,19 @@ class _RecordedDecision:
     """A recorded decision.
 
     Attributes:
-        last: Number of the RC manager's message with its last line.
         heard: Numbers of all its readable messages, from the event to the first message of the next decision.
         is_last: Whether no other decision follows in the recording, which may have ended before its last line.
     """
 
     decided: Decided
-    last: int
     heard: list[int]
     records: list[Record] = field(default_factory=list)
     is_last: bool = False
 
     @property
     def is_whole(self) -> bool:
-        """Whether no message is missing from the event to the one after the last line."""
-        return {*range(self.heard[0], self.last + 2)} <= {*self.heard}
+        """Whether no message is missing from the event to the next one: other messages stand between the lines, too."""
+        return {*range(self.heard[0], self.heard[-1])} <= {*self.heard}
 
 
 def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> DecisionComparison:
@@ -348,9 +346,8 @@ def _steps(
             case ScheduleSnapshot():
                 yield told
             case Decided():
-                step = _RecordedDecision(told, message.sequence, [message.sequence])
+                step = _RecordedDecision(told, [message.sequence])
             case TraceLine() if step is not None:
-                step.last = message.sequence
                 step.records.append(Record(told.line, told.cause))
     if step is not None:
         step.is_last = True
