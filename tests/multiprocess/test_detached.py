@@ -21,7 +21,7 @@ BIN = Path(sys.executable).parent
 SMALLEST = Path(__file__).parents[2] / "docs" / "examples" / "smallest.xml"
 GRABBER = """</hosts>
   <types>
-    <type name="framegrabber" class="sample_components:Broken" subsystem="resource_pool" uses="video_frequency"/>
+    <type name="framegrabber" class="sample_broken_rc:BrokenRc" subsystem="resource_pool" uses="video_frequency"/>
   </types>"""
 TIMES = 20
 
