@@ -79,7 +79,7 @@ class _Reading:
 
     def call(self, what: Callable[..., object], *given: object) -> None:
         """Call this in the event loop. When: in the thread."""
-        with contextlib.suppress(RuntimeError):  # the loop was closed, because nobody waits for this thread any more
+        with contextlib.suppress(RuntimeError):  # the loop is closed: the process ends
             self._loop.call_soon_threadsafe(what, *given)
 
 
@@ -164,7 +164,7 @@ class VideoDevice:
                 self._take_pictures(reading, capture)
             finally:
                 capture.close()
-        except Exception as error:  # nobody waits for the thread
+        except Exception as error:  # it ends the RC, by the event loop
             reading.call(self._failed, reading, error)
         finally:
             reading.call(reading.has_ended.set)
