@@ -74,7 +74,7 @@ def require_writable(path: Path) -> None:
         raise RecorderFailed(f"there is no folder {folder}")
     free = first_free(path)
     try:
-        free.open("xb").close()  # whether that is possible, no question to the system tells for all file systems
+        free.open("xb").close()  # permission bits alone do not decide: /proc takes no new file, also of root
         free.unlink()
     except OSError as error:
         raise RecorderFailed(f"{free} cannot be written: {error.strerror or error}") from error

@@ -3,8 +3,8 @@
 A frame is a zero byte, the stuffed content, and a zero byte. Content: kind (1 byte), network id (1 byte), payload, and
 the CRC of all three (2 bytes, high byte first). Consistent Overhead Byte Stuffing (COBS) replaces the zeros in the
 content, so a zero is always the border of a frame: after a lost byte or a frame without an end, the next frame is
-read again. It adds one byte to a content of up to 253 bytes, whatever they are, so the time of a packet on the line
-depends on its length alone. The CRC is CRC-16/IBM-3740 (polynomial 0x1021, begins with 0xFFFF), which libraries also
+read again. It adds one byte to any content of up to 253 bytes, so the length of a packet alone decides its time on
+the line. The CRC is CRC-16/IBM-3740 (polynomial 0x1021, begins with 0xFFFF), which libraries also
 call CCITT-FALSE.
 
 Rules of this file: pure; bytes in, bytes and frames out.

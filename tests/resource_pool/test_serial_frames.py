@@ -1,4 +1,4 @@
-"""Frames on a serial line: whatever is lost or added, only whole frames are read, and the next one is read again."""
+"""Frames on a serial line: the reader yields only whole frames, also after lost or added bytes."""
 
 from __future__ import annotations
 

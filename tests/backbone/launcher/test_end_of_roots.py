@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import Any, cast
 
+from up_watcher import UpWatcher
+
 from backbone.addresses import PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.launch import Launch
@@ -50,20 +52,6 @@ class KeeperWithoutProcesses:
         return []
 
 
-class Watcher:
-    """Observer of a mission that ends as soon as it is up."""
-
-    def __init__(self) -> None:
-        self.is_up = asyncio.Event()
-
-    async def up(self, *_given: object) -> None:
-        self.is_up.set()
-        await asyncio.Event().wait()
-
-    def __getattr__(self, name: str) -> Callable[..., None]:
-        return lambda *_arguments: None
-
-
 def test_a_root_that_is_cut_off_delays_no_other_and_the_killed_one_is_named(
     local_mission: Callable[..., Any],
 ) -> None:
@@ -88,7 +76,7 @@ def test_a_root_that_is_cut_off_delays_no_other_and_the_killed_one_is_named(
             bus.serve(PLACER, Start | StopComponent | ListPlacements, placer)
             bus.declare_alive(PLACER)
             asker = network.join("ui_console/down", clock)
-            watcher, keeper = Watcher(), cast("ProcessKeeper", KeeperWithoutProcesses(clock))
+            watcher, keeper = UpWatcher(), cast("ProcessKeeper", KeeperWithoutProcesses(clock))
             launcher = Launcher(
                 LAUNCHER,
                 network.join(LAUNCHER.address, clock),

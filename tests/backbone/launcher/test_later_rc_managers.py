@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, cast
 
 import pytest
+from up_watcher import UpWatcher
 
 from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -47,24 +48,10 @@ class KeeperOfOrders:
         self.revised.append(revised)
 
 
-class Watcher:
-    """Observer that learns when the mission is up."""
-
-    def __init__(self) -> None:
-        self.is_up = asyncio.Event()
-
-    async def up(self, *_given: object) -> None:
-        self.is_up.set()
-        await asyncio.Event().wait()
-
-    def __getattr__(self, name: str) -> Callable[..., None]:
-        return lambda *_arguments: None
-
-
 def test_only_the_rc_manager_changes_its_next_start(local_mission: Callable[..., Any]) -> None:
     async def main() -> None:
         async with local_mission() as network:
-            clock, keeper, watcher = VirtualClock(), KeeperOfOrders(), Watcher()
+            clock, keeper, watcher = VirtualClock(), KeeperOfOrders(), UpWatcher()
             launcher = Launcher(
                 LAUNCHER,
                 network.join(LAUNCHER.address, clock),
