@@ -17,6 +17,8 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
+from backbone.authentication import SOCKET
+
 # Four batches (``LINK_BATCH_BYTES``). Measured with pictures of 77 kB over 4 Mbit/s: a question waited for 0.2 s in
 # place of 0.5 s; with 16 KiB hardly any picture arrived.
 MOST_UNSENT_BYTES = 64 * 1024
@@ -29,33 +31,43 @@ def set_options() -> None:
     _for_each(_set_options_of)
 
 
-def shut_down(port: int) -> None:
-    """End the connections of this process from this local TCP port: each peer closes first, then this process."""
-    _for_each(lambda one: one.shutdown(socket.SHUT_WR) if one.getsockname()[1] == port else None)
+def shut_down(local: str, peer: str) -> None:
+    """End this process's connections between two locators of zenoh: each peer closes first, then this process.
+
+    A connection by a unix socket is known by its peer only, because its own end has no address.
+    """
+    _for_each(lambda one: one.shutdown(socket.SHUT_WR) if _is_between(one, local, peer) else None)
 
 
-def received_bytes(port: int) -> int:
-    """Return how many bytes came over the connections of this process from this local TCP port, 0 if there is none."""
+def received_bytes(local: str, peer: str) -> int:
+    """Return how many bytes came over these connections; 0 if there is none, or by a unix socket."""
     counts: list[int] = []
 
     def count(one: socket.socket) -> None:
-        if one.getsockname()[1] == port:
+        if one.family != socket.AF_UNIX and _is_between(one, local, peer):
             counts.extend(_RECEIVED.unpack(one.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _RECEIVED.size)))
 
     _for_each(count)
     return sum(counts)
 
 
+def _is_between(one: socket.socket, local: str, peer: str) -> bool:
+    if one.family == socket.AF_UNIX:
+        return peer == f"{SOCKET}{one.getpeername()}"
+    return local.endswith(f":{one.getsockname()[1]}")
+
+
 def _set_options_of(one: socket.socket) -> None:
-    one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
-    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, MOST_UNSENT_BYTES)
+    if one.family != socket.AF_UNIX:
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
+        one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, MOST_UNSENT_BYTES)
 
 
 def _for_each(act: Callable[[socket.socket], None]) -> None:
-    """Call a function with another handle of each present TCP socket of this process."""
+    """Call a function with another handle of each present stream socket of this process."""
     for entry in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(OSError), _same_socket(int(entry.name)) as same:  # no socket, or closed meanwhile
-            if same.family in (socket.AF_INET, socket.AF_INET6) and same.type == socket.SOCK_STREAM:
+            if same.family in (socket.AF_INET, socket.AF_INET6, socket.AF_UNIX) and same.type == socket.SOCK_STREAM:
                 act(same)
 
 

@@ -1,9 +1,15 @@
-"""Links of a session over TCP: they have our options, and a client's link without messages is replaced.
+"""Links of a session: those over TCP have our options, and a client's link without messages is replaced.
 
-After a cut, a new address, or a loss of many packets, a new connection of zenoh 1.10 may be *deaf*: it stays up and
-keeps itself alive, but passes no message to the client for ever. The hub declares a token, which a client finds over
-every other connection. If a client does not find it, this file ends the connection; then the session connects again by
-itself. A connection over which more than keep-alives came is not deaf: the answer waits behind other messages.
+A new connection of zenoh 1.10 may be *deaf*: it stays up and keeps itself alive, but passes no message to the client,
+or none from it, for ever. That happens if the time of its handshake ends while zenoh reports the connection, which a
+loss of packets, a cut cable or a paused process can cause (docs/decisions/0003-zenoh-settings.md).
+
+- The hub declares a token, which a client finds over every other connection. If a client does not find it, this file
+  ends the connection. One over which more than keep-alives came is not deaf: the answer waits behind other messages.
+- A client has one connection. If a second one appears, zenoh continues the first one with it, but the hub knows
+  nothing of what the client declared over the first. This file ends both.
+
+Then the session connects again by itself.
 """
 
 from __future__ import annotations
@@ -12,10 +18,13 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextlib import suppress
+from typing import NamedTuple
 
 import zenoh
 
+from backbone.authentication import SOCKET
 from backbone.bus.sockets import received_bytes, set_options, shut_down
+from backbone.bus.zenoh_settings import HOST_LEASE_MS
 from backbone.keys import KEY_OF_HUB
 
 log = logging.getLogger(__name__)
@@ -25,6 +34,14 @@ ANSWER_WITHIN_S = 2.0  # chosen: a link without any message for this time counts
 SLOWEST_ANSWER_S = 4.0  # chosen: with such a round trip no command arrives in time
 KEEP_ALIVES_BYTES = 512  # chosen: many times the keep-alives of zenoh 1.10 in 4 s, two a second of four bytes each
 LOOKS = 2  # chosen: a link that loses packets may delay one answer; a deaf link is replaced 6 to 10 s after it began
+OPTIONS_EACH_S = 0.25  # chosen: an attempt to connect lasts up to 2 s, and then its close must not block
+
+
+class Ends(NamedTuple):
+    """Ends of a link, as zenoh names them."""
+
+    local: str
+    peer: str
 
 
 class Links:
@@ -36,7 +53,9 @@ class Links:
 
     def __init__(self, session: zenoh.Session, *, is_hub: bool = False) -> None:
         self._session, self._loop = session, asyncio.get_running_loop()
-        self._next_look: dict[int, asyncio.TimerHandle] = {}
+        self._next_look: dict[Ends, asyncio.TimerHandle] = {}
+        """Of each link of a client that is up."""
+        self._next_options: asyncio.TimerHandle | None = None
         self._looks = not is_hub
         self._answer_within_s = ANSWER_WITHIN_S  # doubles with each replaced link, because a slow link is not deaf
         self._token = session.liveliness().declare_token(KEY_OF_HUB) if is_hub else None
@@ -46,53 +65,76 @@ class Links:
     def close(self) -> None:
         """Look at no link any more."""
         self._looks = False
-        for port in tuple(self._next_look):
-            self._forget(port)
+        for ends in tuple(self._next_look):
+            self._forget(ends)
+        self._stop_options()
 
     def _changed(self, event: zenoh.LinkEvent) -> None:
-        protocol, _, local = event.link.src.partition("/")
-        if protocol != "tcp":
-            return
-        is_up = event.kind == zenoh.SampleKind.PUT
-        if is_up:
+        is_up, ends = event.kind == zenoh.SampleKind.PUT, Ends(event.link.src, event.link.dst)
+        if is_up and not ends.peer.startswith(SOCKET):
             set_options()
-        self._call_soon(self._look_later if is_up else self._forget, int(local.rpartition(":")[2]))
+        if self._looks:
+            self._call_soon(self._is_up if is_up else self._is_down, ends)
 
     def _call_soon(self, act: Callable[..., None], *arguments: object) -> None:
         with suppress(RuntimeError):  # the loop is closed
             self._loop.call_soon_threadsafe(act, *arguments)
 
-    def _look_later(self, port: int, looks: int = LOOKS) -> None:
-        if self._looks:
-            self._next_look[port] = self._loop.call_later(LOOK_EACH_S, self._look, port, looks - 1)
+    def _is_up(self, ends: Ends) -> None:
+        self._stop_options()
+        self._look_later(ends)
+        if len(self._next_look) > 1:
+            log.warning("a second link to the hub continues the first one, so both are made anew")
+            for each in tuple(self._next_look):
+                shut_down(*each)
 
-    def _forget(self, port: int) -> None:
-        if (look := self._next_look.pop(port, None)) is not None:
+    def _is_down(self, ends: Ends) -> None:
+        self._forget(ends)
+        if self._looks and not self._next_look and not ends.peer.startswith(SOCKET):
+            self._set_options_repeatedly()
+
+    def _set_options_repeatedly(self) -> None:
+        """Let no attempt to connect block when it is given up, until a link is up."""
+        self._stop_options()
+        set_options()
+        self._next_options = self._loop.call_later(OPTIONS_EACH_S, self._set_options_repeatedly)
+
+    def _stop_options(self) -> None:
+        if self._next_options is not None:
+            self._next_options.cancel()
+
+    def _look_later(self, ends: Ends, looks: int = LOOKS) -> None:
+        if self._looks:
+            self._next_look[ends] = self._loop.call_later(LOOK_EACH_S, self._look, ends, looks - 1)
+
+    def _forget(self, ends: Ends) -> None:
+        if (look := self._next_look.pop(ends, None)) is not None:
             look.cancel()
 
-    def _look(self, port: int, looks_left: int) -> None:
+    def _look(self, ends: Ends, looks_left: int) -> None:
         """Ask the hub for its token; if there is no answer, ask again or end the connection."""
         found: list[zenoh.Reply] = []
-        most_bytes = received_bytes(port) + KEEP_ALIVES_BYTES
+        most_bytes = received_bytes(*ends) + KEEP_ALIVES_BYTES
 
         def ended() -> None:
             if any(reply.ok for reply in found):  # the end of the time is a reply, too
                 self._answer_within_s = ANSWER_WITHIN_S
             else:
-                self._call_soon(self._found_nothing, port, looks_left, most_bytes)
+                self._call_soon(self._found_nothing, ends, looks_left, most_bytes)
 
         answers = zenoh.handlers.Callback(found.append, ended, indirect=False)
-        self._session.liveliness().get(KEY_OF_HUB, answers, timeout=self._answer_within_s)
+        within_s = HOST_LEASE_MS / 1000 if ends.peer.startswith(SOCKET) else self._answer_within_s
+        self._session.liveliness().get(KEY_OF_HUB, answers, timeout=within_s)
 
-    def _found_nothing(self, port: int, looks_left: int, most_bytes: int) -> None:
+    def _found_nothing(self, ends: Ends, looks_left: int, most_bytes: int) -> None:
         """Look again or end the connection, unless more bytes came than a deaf link passes, ``most_bytes``."""
-        if port not in self._next_look:  # this connection has ended
+        if ends not in self._next_look:  # this connection has ended
             return
-        if received_bytes(port) > most_bytes:
+        if received_bytes(*ends) > most_bytes:
             return
         if looks_left:
-            self._look_later(port, looks_left)
+            self._look_later(ends, looks_left)
         else:
-            log.warning("the link from port %d to the hub passes no messages, so it is made anew", port)
+            log.warning("the link %s to the hub passes no messages, so it is made anew", ends.local)
             self._answer_within_s = min(2 * self._answer_within_s, SLOWEST_ANSWER_S)
-            shut_down(port)
+            shut_down(*ends)

@@ -20,6 +20,7 @@ KEEP_ALIVES = 4  # chosen: in each lease, so that three may be late
 RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
 OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine listens within this time
 WAIT_BEFORE_CLOSE_US = 1_000_000  # chosen: the longest time for which a hung consumer may block a sender
+HANDSHAKE_MS = 2000  # chosen: one that is slower has lost packets, and a new one sends them sooner than TCP does
 _QUIET = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
 _RETRY = {"period_init_ms": RETRY_FIRST_MS, "period_max_ms": RETRY_MOST_MS, "period_increase_factor": RETRY_FACTOR}
 
@@ -68,8 +69,9 @@ def hub_settings(listen: list[str], dictionary_file: str) -> dict[str, object]:
 
 def _transport(endpoints: Iterable[str], batch_bytes: int, auth: Mapping[str, object]) -> dict[str, object]:
     is_inside = all(endpoint.startswith(SOCKET) for endpoint in endpoints)
+    handshake_ms = HOST_LEASE_MS if is_inside else HANDSHAKE_MS
     return {
-        "unicast": {"open_timeout": 2000, "accept_timeout": 2000},
+        "unicast": {"open_timeout": handshake_ms, "accept_timeout": handshake_ms},
         "link": {
             "tx": {
                 "lease": HOST_LEASE_MS if is_inside else LINK_LEASE_MS,
