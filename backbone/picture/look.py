@@ -124,11 +124,11 @@ async def _ask_or_absence(
         return printable_all(await bus.ask(address, question, reply, within_s=LOOK_TIME_S))
     except (Refusal, LinkError) as error:
         if offered:  # a slow link hides it as well as a fault; the mission's own services are sound
-            doing, remedy = f"{offered} restarts it if it hangs", f"If it stays silent, check the link to {offered}."
+            doing, remedy = f"{offered} restarts it if it hangs", f"if it stays silent, check the link to {offered}"
             return Absence(component_of(address), now_s, f"no answer: {error}", doing, remedy)
         launched = address != LAUNCHER
         doing = "the launcher restarts it" if launched else "it may answer again; nothing restarts a launcher"
-        remedy = "" if launched else "If it stays silent: 'scout-backbone down', then 'up' again."
+        remedy = "" if launched else "if it stays silent: 'scout-backbone down', then 'up' again"
         return Absence(component_of(address), now_s, f"no answer: {error}", doing, remedy, vital=True)
 
 
