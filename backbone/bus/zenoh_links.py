@@ -56,11 +56,15 @@ class Links:
         self._next_look: dict[Ends, asyncio.TimerHandle] = {}
         """Of each link of a client that is up."""
         self._next_options: asyncio.TimerHandle | None = None
-        self._looks = not is_hub
+        self._looks, self._is_inside = not is_hub, False
         self._answer_within_s = ANSWER_WITHIN_S  # doubles with each replaced link, because a slow link is not deaf
         self._token = session.liveliness().declare_token(KEY_OF_HUB) if is_hub else None
-        changed = zenoh.handlers.Callback(self._changed, indirect=False)
-        self._listener = session.info.declare_link_events_listener(changed, history=True)
+        # A report lasts as long as its callback, and the time of a handshake goes on: a hub's waits for no Python.
+        changed = zenoh.handlers.Callback(self._changed, indirect=is_hub)
+        session.info.declare_link_events_listener(changed, history=True)
+        if not is_hub:  # of a link whose sender gave up, only the end of the transport is reported
+            ended = zenoh.handlers.Callback(self._transport_changed, indirect=False)
+            session.info.declare_transport_events_listener(ended)
 
     def close(self) -> None:
         """Look at no link any more."""
@@ -70,32 +74,39 @@ class Links:
         self._stop_options()
 
     def _changed(self, event: zenoh.LinkEvent) -> None:
-        is_up, ends = event.kind == zenoh.SampleKind.PUT, Ends(event.link.src, event.link.dst)
-        if is_up and not ends.peer.startswith(SOCKET):
+        if event.kind == zenoh.SampleKind.PUT and not event.link.dst.startswith(SOCKET):
             set_options()
-        if self._looks:
-            self._call_soon(self._is_up if is_up else self._is_down, ends)
+        self._call_soon(self._follow)
+
+    def _transport_changed(self, event: zenoh.TransportEvent) -> None:
+        if event.kind == zenoh.SampleKind.DELETE:
+            self._call_soon(self._follow)
 
     def _call_soon(self, act: Callable[..., None], *arguments: object) -> None:
-        with suppress(RuntimeError):  # the loop is closed
-            self._loop.call_soon_threadsafe(act, *arguments)
+        if self._looks:
+            with suppress(RuntimeError):  # the loop is closed
+                self._loop.call_soon_threadsafe(act, *arguments)
 
-    def _is_up(self, ends: Ends) -> None:
-        self._stop_options()
-        self._look_later(ends)
-        if len(self._next_look) > 1:
+    def _follow(self) -> None:
+        """Look at the links that are up now. Reports only say that some changed; one may come late or never."""
+        if not self._looks:
+            return
+        links = {Ends(link.src, link.dst) for link in self._session.info.links()}
+        for ends in self._next_look.keys() - links:
+            self._forget(ends)
+        for ends in links - self._next_look.keys():
+            self._is_inside = ends.peer.startswith(SOCKET)
+            self._look_later(ends)
+        if len(links) > 1:
             log.warning("a second link to the hub continues the first one, so both are made anew")
-            for each in tuple(self._next_look):
-                shut_down(*each)
-
-    def _is_down(self, ends: Ends) -> None:
-        self._forget(ends)
-        if self._looks and not self._next_look and not ends.peer.startswith(SOCKET):
+            for ends in links:
+                shut_down(*ends)
+        self._stop_options()
+        if not links and not self._is_inside:
             self._set_options_repeatedly()
 
     def _set_options_repeatedly(self) -> None:
         """Let no attempt to connect block when it is given up, until a link is up."""
-        self._stop_options()
         set_options()
         self._next_options = self._loop.call_later(OPTIONS_EACH_S, self._set_options_repeatedly)
 
@@ -123,7 +134,7 @@ class Links:
                 self._call_soon(self._found_nothing, ends, looks_left, most_bytes)
 
         answers = zenoh.handlers.Callback(found.append, ended, indirect=False)
-        within_s = HOST_LEASE_MS / 1000 if ends.peer.startswith(SOCKET) else self._answer_within_s
+        within_s = HOST_LEASE_MS / 1000 if self._is_inside else self._answer_within_s
         self._session.liveliness().get(KEY_OF_HUB, answers, timeout=within_s)
 
     def _found_nothing(self, ends: Ends, looks_left: int, most_bytes: int) -> None:

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -24,6 +24,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, ComponentState, Statistics
+from backbone.errors import NoResponder
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from mission_control.modules.arrangement import UnitOrder, arranged
@@ -122,7 +123,10 @@ async def is_there(endpoint: str) -> None:
             bus.subscribe(f"{ROBOT}/done", Conversation.OUTPUTS, Reading, lambda _one: heard.set())
             await alive.wait()
             await heard.wait()
-            told = await bus.ask(ROBOT, AskStatistics(), Statistics, within_s=WITHIN_S)
+            told = None
+            while told is None:
+                with suppress(NoResponder):  # the hub has just forgotten the session before this one
+                    told = await bus.ask(ROBOT, AskStatistics(), Statistics, within_s=WITHIN_S)
             assert told.values.get("thread_lost", 0.0) == 0.0
     finally:
         await bus.close()

@@ -20,10 +20,13 @@ class Relay:
     Attributes:
         endpoint: Where clients connect.
         is_deaf: While it is set, the first connection passes only keep-alives and pictures to its client.
+        reads: While it is not set, it reads nothing more.
     """
 
     def __init__(self, hub_port: int, delay_s: float) -> None:
         self.endpoint, self.is_deaf = "", asyncio.Event()
+        self.reads = asyncio.Event()
+        self.reads.set()
         self._hub_port, self._delay_s = hub_port, delay_s
         self._at_hub, self._at_client = list[asyncio.StreamWriter](), list[asyncio.StreamWriter]()
         self._stay_open, self._tasks = list[asyncio.StreamWriter](), set[asyncio.Task[None]]()
@@ -53,6 +56,7 @@ class Relay:
             while True:
                 length = await reader.readexactly(2)
                 batch = await reader.readexactly(int.from_bytes(length, "little"))
+                await self.reads.wait()
                 is_other = not LONGEST_KEEP_ALIVE < len(batch) < SHORTEST_PICTURE
                 if is_other or not (may_be_deaf and self.is_deaf.is_set()):
                     asyncio.get_running_loop().call_later(self._delay_s, writer.write, length + batch)

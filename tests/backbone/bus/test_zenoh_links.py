@@ -137,6 +137,30 @@ async def test_a_second_link_that_continues_a_lost_one_is_replaced(monkeypatch: 
                 await bus.close()
 
 
+async def test_a_session_whose_sender_gave_its_link_up_has_one_link_afterwards() -> None:
+    """A receiver that hangs ends it, and zenoh reports no end of the link."""
+    endpoint, clock = free_endpoint(), MissionClock.started_now()
+    hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
+    hub.subscribe(RC, Conversation.EVENTS, Echo, lambda _event: None)
+    async with relay_to(endpoint) as relay:
+        bus = await ZenohBus.open_when_up(MISSION, RC, clock, client_config(relay.endpoint))
+        try:
+            assert await changes(bus, 1) == [True]
+            relay.reads.clear()
+            seen: list[bool] = []
+            bus.watch_link(seen.append)
+            while False not in seen:
+                bus.publish(RC, Conversation.EVENTS, Echo("x" * 1_000_000))  # blocks until it gives the link up
+                await asyncio.sleep(0)
+            relay.reads.set()
+            async with asyncio.timeout(NOTICED_WITHIN_S):
+                while (await changes(bus, 9, within_s=1.0)) != [True]:
+                    pass
+        finally:
+            await bus.close()
+    await hub.close()
+
+
 async def test_an_attempt_to_connect_never_blocks_when_it_is_given_up() -> None:
     endpoint, clock = free_endpoint(), MissionClock.started_now()
     port = int(endpoint.rpartition(":")[2])
