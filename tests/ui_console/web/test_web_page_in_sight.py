@@ -66,6 +66,23 @@ IS_IN_SIGHT = """(one) => {
 }"""
 
 
+IS_WHOLE = """([state, name]) => {
+  const health = document.getElementById("health");
+  [health.hidden, health.textContent, document.getElementById("mission").textContent] = [false, state, name];
+  return health.scrollWidth <= health.clientWidth;
+}"""
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+async def test_the_state_of_the_mission_is_never_cut_for_its_name(stage: Stage, width: int, height: int) -> None:
+    stage.place_robots("scout1", LONGEST)
+    async with page_at(stage, "phone", may_be_kept=False) as page:
+        await page.set_viewport_size({"width": width, "height": height})
+        await take(page, LONGEST)
+        assert await page.evaluate(IS_WHOLE, ["mission degraded", LONGEST])
+        await assert_no_sideways_scroll(page)
+
+
 @pytest.mark.parametrize(("width", "height"), rest_thorough(SCREENS, 3))
 async def test_commands_and_news_cover_neither_picture_nor_pad_nor_stops(stage: Stage, width: int, height: int) -> None:
     stage.place_robots("scout1", LONGEST)
