@@ -6,8 +6,8 @@ loss of packets, a cut cable or a paused process can cause (docs/decisions/0003-
 
 - The hub declares a token, which a client finds over every other connection. If a client does not find it, this file
   ends the connection. One over which more than keep-alives came is not deaf: the answer waits behind other messages.
-- A client has one connection. If a second one appears, zenoh continues the first one with it, but the hub knows
-  nothing of what the client declared over the first. This file ends both.
+- A client has one connection at a time, each a transport of its own. If one appears without, zenoh continues the
+  transport of an earlier one with it, but the hub knows nothing of what the client declared. This file ends both.
 
 Then the session connects again by itself.
 """
@@ -57,14 +57,15 @@ class Links:
         """Of each link of a client that is up."""
         self._next_options: asyncio.TimerHandle | None = None
         self._looks, self._is_inside = not is_hub, False
+        self._is_new_transport = False
         self._answer_within_s = ANSWER_WITHIN_S  # doubles with each replaced link, because a slow link is not deaf
         self._token = session.liveliness().declare_token(KEY_OF_HUB) if is_hub else None
         # A report lasts as long as its callback, and the time of a handshake goes on: a hub's waits for no Python.
         changed = zenoh.handlers.Callback(self._changed, indirect=is_hub)
+        if not is_hub:  # zenoh reports a transport before its first link
+            transport_changed = zenoh.handlers.Callback(self._transport_changed, indirect=False)
+            session.info.declare_transport_events_listener(transport_changed, history=True)
         session.info.declare_link_events_listener(changed, history=True)
-        if not is_hub:  # of a link whose sender gave up, only the end of the transport is reported
-            ended = zenoh.handlers.Callback(self._transport_changed, indirect=False)
-            session.info.declare_transport_events_listener(ended)
 
     def close(self) -> None:
         """Look at no link any more."""
@@ -74,21 +75,30 @@ class Links:
         self._stop_options()
 
     def _changed(self, event: zenoh.LinkEvent) -> None:
-        if event.kind == zenoh.SampleKind.PUT and not event.link.dst.startswith(SOCKET):
-            set_options()
-        self._call_soon(self._follow)
+        continues_another = False
+        if event.kind == zenoh.SampleKind.PUT:
+            if not event.link.dst.startswith(SOCKET):
+                set_options()
+            continues_another, self._is_new_transport = not self._is_new_transport, False
+        self._call_soon(self._follow, continues_another)
 
     def _transport_changed(self, event: zenoh.TransportEvent) -> None:
-        if event.kind == zenoh.SampleKind.DELETE:
-            self._call_soon(self._follow)
+        if event.kind == zenoh.SampleKind.PUT:
+            self._is_new_transport = True
+        else:  # of a link that its sender gave up, no end is reported
+            self._call_soon(self._follow, False)
 
     def _call_soon(self, act: Callable[..., None], *arguments: object) -> None:
         if self._looks:
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(act, *arguments)
 
-    def _follow(self) -> None:
-        """Look at the links that are up now. Reports only say that some changed; one may come late or never."""
+    def _follow(self, continues_another: bool) -> None:
+        """Look at the links that are up now. Reports only say that some changed; one may come late or never.
+
+        Args:
+            continues_another: A link came up without a transport of its own. The other link may have ended already.
+        """
         if not self._looks:
             return
         links = {Ends(link.src, link.dst) for link in self._session.info.links()}
@@ -97,8 +107,8 @@ class Links:
         for ends in links - self._next_look.keys():
             self._is_inside = ends.peer.startswith(SOCKET)
             self._look_later(ends)
-        if len(links) > 1:
-            log.warning("a second link to the hub continues the first one, so both are made anew")
+        if continues_another:
+            log.warning("a link to the hub continues an earlier one, which the hub has forgotten, so it is made anew")
             for ends in links:
                 shut_down(*ends)
         self._stop_options()

@@ -42,6 +42,11 @@ class Relay:
         for stream in self._at_hub:
             stream.close()
 
+    def let_go(self) -> None:
+        """End the clients' sides that stayed open."""
+        for stream in self._stay_open:
+            stream.close()
+
     async def connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Carry what comes over a new connection."""
         hub_reader, hub_writer = await asyncio.open_connection("127.0.0.1", self._hub_port)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -105,10 +106,18 @@ async def test_a_link_that_only_keeps_itself_alive_is_replaced() -> None:
     await hub.close()
 
 
-async def test_a_second_link_that_continues_a_lost_one_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("late_s", [0.0, 3.0], ids=["at once", "when the lost one has ended"])
+async def test_a_second_link_that_continues_a_lost_one_is_replaced(
+    late_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The handshake's time ends while a link is reported, so zenoh makes another one; then the hub loses the first."""
-    monkeypatch.setattr(zenoh_links, "LOOK_EACH_S", 2 * NOTICED_WITHIN_S)
     endpoint, clock, loop = free_endpoint(), MissionClock.started_now(), asyncio.get_running_loop()
+
+    def call_later(_links: object, act: Callable[..., None], *arguments: object) -> None:
+        loop.call_soon_threadsafe(loop.call_later, late_s, act, *arguments)
+
+    monkeypatch.setattr(zenoh_links, "LOOK_EACH_S", 2 * NOTICED_WITHIN_S)
+    monkeypatch.setattr(zenoh_links.Links, "_call_soon", call_later)
     hub = ZenohBus.open(MISSION, "backbone/hub", clock, hub_config([endpoint]))
     asker = ZenohBus.open(MISSION, CLIENT, clock, client_config(endpoint))
     async with relay_to(endpoint) as relay:
@@ -125,6 +134,8 @@ async def test_a_second_link_that_continues_a_lost_one_is_replaced(monkeypatch: 
                 if len(links) == 2:
                     loop.call_soon_threadsafe(relay.cut_at_hub)
                     time.sleep(2 * HANDSHAKE_S)
+                elif len(links) == 3:
+                    loop.call_soon_threadsafe(relay.let_go)
 
         session.info.declare_link_events_listener(zenoh.handlers.Callback(reported, indirect=False), history=True)
         try:
