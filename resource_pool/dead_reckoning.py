@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from copy import copy
 from dataclasses import dataclass, replace
 
 from resource_pool.doubt import Doubt
@@ -35,6 +36,10 @@ FARTHEST_M = 1e6  # the limit of ``Meters``
 REMEMBERED_S = 1.0  # chosen: a landmark is found at most a third of a second after its picture was taken
 REMEMBERED = 128  # chosen: twice as many motions as arrive in that time
 SIGHT_LASTS_S = 1.0  # chosen: while a robot sees a landmark, sightings arrive several times a second
+
+Motion = tuple[float, float, float]
+"""Forward m/s, turn rad/s, and the mission time at which the motion ends by itself."""
+STILL: Motion = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,18 +104,29 @@ class DeadReckoning:
 
     Args:
         begin: The first belief; finite.
+        motion: The motion in progress; see ``motion``.
     """
 
-    def __init__(self, begin: Belief) -> None:
+    def __init__(self, begin: Belief, motion: Motion = STILL) -> None:
         self._belief = begin
         self._doubt = Doubt.of(begin.spread_m, begin.spread_rad)
-        self._moves = (0.0, 0.0)
-        self._until_s = begin.at_s
+        self._moves, self._until_s = motion[:2], motion[2]
         self._count: tuple[float, float, float] | None = None  # its own count: way, turn, mission time
         self._counted_from = (begin, self._doubt)
         self._commanded: tuple[float, float] | None = (0.0, 0.0)  # way and turn since the last count; None: unknown
         self._sighted_s = -math.inf
         self._past = deque([(begin.at_s, begin.pose)], maxlen=REMEMBERED)
+
+    def copy(self) -> DeadReckoning:
+        """Return an independent copy."""
+        twin = copy(self)
+        twin._past = self._past.copy()  # noqa: SLF001  of this class
+        return twin
+
+    @property
+    def motion(self) -> Motion:
+        """The last motion: its speeds, and the mission time at which it ends by itself."""
+        return (*self._moves, self._until_s)
 
     @property
     def is_moving(self) -> bool:
@@ -132,7 +148,15 @@ class DeadReckoning:
     def jumps(self, at_s: float) -> None:
         """Record a jump: the robot leaves the floor and lands somewhere near."""
         self.moves(0.0, 0.0, at_s)
-        self._loses(JUMP_M, JUMP_RAD)
+        self.loses(JUMP_M, JUMP_RAD)
+
+    def loses(self, spread_m: float, spread_rad: float) -> None:
+        """Record that something moved the robot: add an independent error with these standard deviations."""
+        self._doubt = self._doubt.larger(spread_m, spread_rad)
+        self._widen(math.hypot(self._belief.spread_m, spread_m), math.hypot(self._belief.spread_rad, spread_rad))
+        self._commanded = None
+        if self._count is not None:
+            self._counted_from = (self._belief, self._doubt)
 
     def counts(self, way_m: float, turned_rad: float, at_s: float) -> None:
         """Use the robot's own count of way and turn since power-on instead of the commanded motion.
@@ -185,13 +209,6 @@ class DeadReckoning:
         self._count, self._commanded, self._sighted_s = None, None, now.at_s
         self._past.clear()
         self._remember()
-
-    def _loses(self, spread_m: float, spread_rad: float) -> None:
-        self._doubt = self._doubt.larger(spread_m, spread_rad)
-        self._widen(math.hypot(self._belief.spread_m, spread_m), math.hypot(self._belief.spread_rad, spread_rad))
-        self._commanded = None
-        if self._count is not None:
-            self._counted_from = (self._belief, self._doubt)
 
     def _go(self, way_m: float, turned_rad: float, at_s: float) -> None:
         """Add a way along an arc."""

@@ -1,10 +1,10 @@
 """Localizer: estimates robots' poses by dead reckoning and landmarks, without ceiling camera and without simulator.
 
 It begins with the start places in the mission file, and adds the motions that RCs publish and the odometry of the
-robots. If a behavior sees a landmark, the localizer corrects the robot's pose. The rules are in ``dead_reckoning``;
-this file has the loop. The localizer saves its beliefs in a file. A restarted localizer continues from the file; for
-each robot it raises the uncertainty by the motions that the missed commands may have caused. Without the file, the pose
-of every robot that was commanded before is unknown.
+robots. If a behavior sees a landmark, the localizer corrects the robot's pose. It saves its beliefs in a file, and a
+restarted localizer continues from the file. Motions that it missed, because it did not run or its link was cut, it gets
+from the robots' RCs. Without the file, the pose of every robot that was commanded before is unknown. The rules are in
+``dead_reckoning`` and ``motion_track``; this file has the loop.
 
 In mission.xml: a resource of type ``localizer``, named by behaviors as ``localizer``. No ARC needs it.
 """
@@ -15,6 +15,7 @@ import asyncio
 import base64
 import logging
 import math
+from functools import partial
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -24,17 +25,19 @@ from backbone.atomic_file import replace_file
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
-from backbone.errors import LinkError, Refusal
+from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import AskRc, Connect, Disconnect, RcState
+from backbone.rc_manager.messages import AskRc, Connect, Disconnect
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.begin_places import read_begins
-from resource_pool.commands import Halt, Jump
-from resource_pool.dead_reckoning import Belief, DeadReckoning, FloorPose
+from resource_pool.commands import Halt
+from resource_pool.dead_reckoning import STILL, Belief, FloorPose
 from resource_pool.floor_plans import board, plan_of, sighted_from
 from resource_pool.localization import AskFloorPlan, AskHome, AskPose, FloorPlan, LandmarkSighting, Pose, UnknownPlace
-from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, Readings
+from resource_pool.messages import Applied, Readings
+from resource_pool.motion_track import Known, MotionTrack
+from resource_pool.published_motions import AskMotions, Motions
 from resource_pool.rc_readings import watch_readings
 from resource_pool.resource_controller import RcParameters, ResourceController
 from scout_model.description import WorldDescription
@@ -45,11 +48,10 @@ EVERY_S = 0.2  # chosen: five poses a second are a smooth track on a map
 PLACED_M = 0.02  # chosen: a person puts a robot on its mark by hand
 PLACED_RAD = math.radians(2.0)  # chosen: same
 SIGHTED_RAD = math.radians(3.0)  # chosen: twice what servoing at 1 m was measured to err
-UNSEEN_M_S = 0.2  # chosen: standard deviation of a speed of up to 0.35 m/s forward or backward
-UNSEEN_RAD_S = 0.9  # chosen: same, of up to 1.5 rad/s
 LOST_M = 100.0  # chosen: larger than a room: the place is unknown
-LATE_S = 0.5  # chosen: an older message says nothing about the present
-FIRST_REPLY_S = 0.5  # chosen: a running RC answers in milliseconds
+RC_REPLY_S = 0.5  # chosen: a running RC answers in milliseconds
+ASKED_MOST = 6  # chosen: an RC that is busy for some seconds is not lost
+RECOVERED_MOST = 2  # chosen: a further motion may be lost while the first answer is on its way
 WAY, TURNED = "way_m", "turned_rad"
 """Fields of a robot's reports with its odometry: way and turn since power-on."""
 
@@ -103,28 +105,13 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
         )
 
 
-class Known(msgspec.Struct, frozen=True):
-    """Saved knowledge about a robot.
-
-    Attributes:
-        number: Number of commands that its RC had applied.
-        is_moving: True if the robot was moving.
-    """
-
-    belief: Belief
-    number: int
-    is_moving: bool
-
-
 class Memory(msgspec.Struct, frozen=True):
     """The state that a localizer saves for its next process.
 
     Attributes:
-        at_s: Mission time.
         robots: Robot → what is known of it.
     """
 
-    at_s: float
     robots: dict[str, Known]
 
 
@@ -141,21 +128,23 @@ class Localizer(ResourceController[LocalizerParameters]):
         self._homes = self.parameters.begins()
         self._file = Path(launch.run_directory) / "localizers" / self.name if launch.run_directory else None
         self._before = _read(self._file)
-        self._robots: dict[str, DeadReckoning] = {}
-        self._numbers = dict.fromkeys(self._homes, 0)
+        self._robots: dict[str, MotionTrack] = {}
+        self._recovering: set[str] = set()
         self._published: dict[str, Pose] = {}
         self._stir = asyncio.Event()
-        self._heard = self._sightings = self._poses = 0
+        self._heard = self._recovered = self._sightings = self._poses = 0
 
     async def connect(self) -> None:
         """Subscribe to robots' RCs and to behaviors that see landmarks."""
         await super().connect()
+        await asyncio.gather(*map(self._begin, self._homes))
         for name in self._homes:
-            self.bus.subscribe(address(Subsystem.RESOURCE_POOL, name), Conversation.MOTIONS, Applied, self._applied)
+            rc = address(Subsystem.RESOURCE_POOL, name)
+            self.bus.subscribe(rc, Conversation.MOTIONS, Applied, self._applied)
+            self.bus.watch_alive(rc, partial(self._rc_lives, name))
         watch_readings(self.bus, self._counted)
         sights = f"{Subsystem.MISSION_CONTROL}/*"
         self.bus.subscribe(sights, Conversation.SIGHTINGS, LandmarkSighting, self._sighted)
-        await asyncio.gather(*map(self._begin, self._homes))
 
     async def serve(self) -> None:
         """Publish each pose that changes, and save the beliefs."""
@@ -176,27 +165,29 @@ class Localizer(ResourceController[LocalizerParameters]):
 
     def statistics(self) -> dict[str, float]:
         """Also count messages received and poses published."""
-        own = {"motions_heard": self._heard, "sightings_taken": self._sightings, "poses_published": self._poses}
+        own = {
+            "motions_heard": self._heard,
+            "motions_recovered": self._recovered,
+            "sightings_taken": self._sightings,
+            "poses_published": self._poses,
+        }
         return {**super().statistics(), **own, "robots_known": len(self._robots)}
 
     def _applied(self, envelope: Envelope[Applied]) -> None:
         told, robot = envelope.body, self._robots.get(envelope.body.rc)
         if robot is None or envelope.source != address(Subsystem.RESOURCE_POOL, told.rc):
             return
-        self._heard, self._numbers[told.rc] = self._heard + 1, told.number
-        at_s = self._plausible_s(told.at_s)
-        if told.command == Halt.word():
-            robot.moves(0.0, 0.0, at_s)
-        elif told.command == Jump.word():
-            robot.jumps(at_s)
-        elif "forward_m_s" in told.values and "turn_rad_s" in told.values:
-            robot.moves(told.values["forward_m_s"], told.values["turn_rad_s"], at_s)
+        self._heard += 1
+        robot.moved(self._plausible(told))
+        if robot.has_gap:
+            self._recover_soon(told.rc)
         self._stir.set()
 
     def _counted(self, told: Readings) -> None:
         robot = self._robots.get(told.rc)
         if robot is not None and WAY in told.values and TURNED in told.values:
-            robot.counts(told.values[WAY], told.values[TURNED], self._plausible_s(told.at_s))
+            way_m, turned_rad, at_s = told.values[WAY], told.values[TURNED], min(told.at_s, self.clock.now_s())
+            robot.happened(at_s, lambda robot: robot.counts(way_m, turned_rad, at_s))
             self._stir.set()
 
     def _sighted(self, envelope: Envelope[LandmarkSighting]) -> None:
@@ -205,14 +196,51 @@ class Localizer(ResourceController[LocalizerParameters]):
             return
         pose = sighted_from(self._plan, sighting, robot.believe(self.clock.now_s()))
         if pose is not None:
-            robot.sighted(pose, sighting.spread_m, SIGHTED_RAD, min(sighting.at_s, self.clock.now_s()))
+            at_s = min(sighting.at_s, self.clock.now_s())
+            robot.happened(at_s, lambda robot: robot.sighted(pose, sighting.spread_m, SIGHTED_RAD, at_s))
             self._sightings += 1
             self._stir.set()
 
-    def _plausible_s(self, at_s: float) -> float:
-        """Return the time in a message, or the present time if the message cannot have been sent at that time."""
-        now_s = self.clock.now_s()
-        return at_s if now_s - LATE_S * max(1.0, self.clock.rate) <= at_s <= now_s else now_s
+    def _plausible(self, told: Applied) -> Applied:
+        return msgspec.structs.replace(told, at_s=min(told.at_s, self.clock.now_s()))
+
+    def _rc_lives(self, robot: str, _rc: str, is_alive: bool) -> None:
+        """Recover what was missed: the RC may have been cut off, or published its first motions before it was known."""
+        if is_alive:
+            self._recover_soon(robot)
+
+    def _recover_soon(self, robot: str) -> None:
+        if robot not in self._recovering:
+            self._recovering.add(robot)
+            self.start_task(self._recover(robot), f"recover motions of {robot}")
+
+    async def _recover(self, name: str) -> None:
+        robot = self._robots[name]
+        for _ in range(RECOVERED_MOST):
+            before_s = robot.last_s
+            told = await self._ask_motions(name, before_s)
+            if told is None:
+                break
+            robot.recover(told)
+            self._recovered += sum(one.at_s > before_s for one in told.motions)
+            if not robot.has_gap:
+                break
+        robot.give_up()
+        self._recovering.discard(name)
+        self._stir.set()
+
+    async def _ask_motions(self, robot: str, since_s: float) -> Motions | None:
+        """Return the RC's motions from this time on; None if it does not run or does not answer."""
+        rc = address(Subsystem.RESOURCE_POOL, robot)
+        for _ in range(ASKED_MOST):
+            try:
+                told = await self.bus.ask(rc, AskMotions(since_s), Motions, within_s=RC_REPLY_S)
+            except (NoResponder, Refusal):
+                return None
+            except LinkError:
+                continue
+            return msgspec.structs.replace(told, motions=list(map(self._plausible, told.motions)))
+        return None
 
     def _pose(self, body: str) -> Pose:
         robot = self._robots.get(body)
@@ -253,49 +281,29 @@ class Localizer(ResourceController[LocalizerParameters]):
         self._keep(now_s)
 
     async def _begin(self, name: str) -> None:
-        """Begin with a robot: ask its RC how many commands it applied before this process of the localizer began."""
-        try:
-            rc = address(Subsystem.RESOURCE_POOL, name)
-            applied: int | None = (await self.bus.ask(rc, AskRc(), RcState, within_s=FIRST_REPLY_S)).applied
-        except (LinkError, Refusal):  # the RC does not run: at the begin of a mission it has applied no command
-            applied = None
-        first = self._first(name, applied)
-        self._robots[name], self._numbers[name] = DeadReckoning(first), applied or 0
-        if first.spread_m >= LOST_M:
-            self.publish_event(name, f"is at a place that {self.name} does not know", LogLevel.WARNING)
-
-    def _first(self, name: str, applied: int | None) -> Belief:
-        """Return the first belief: the start place, or the saved belief with more uncertainty for missed commands.
-
-        Args:
-            applied: Number of commands that its RC has applied; None: the RC does not run.
-        """
-        now_s, before = self.clock.now_s(), self._before
-        if before is None and not applied:
-            return Belief(self._homes[name], now_s, PLACED_M, PLACED_RAD)
-        if before is None or name not in before.robots:
-            return Belief(self._homes[name], now_s, LOST_M, math.pi)
-        was, missed_s = before.robots[name], max(0.0, now_s - before.at_s)
-        if applied is not None and applied >= was.number:
-            missed_s = min(missed_s, (applied - was.number + was.is_moving) * COMMAND_TIMEOUT_S)
-        spread_m, spread_rad = was.belief.spread_m, was.belief.spread_rad
-        return Belief(
-            was.belief.pose,
-            now_s,
-            min(LOST_M, spread_m + UNSEEN_M_S * missed_s),
-            min(math.pi, spread_rad + UNSEEN_RAD_S * missed_s),
-        )
+        """Continue from the saved knowledge, or begin at the start place of a robot that no command has moved yet."""
+        now_s = self.clock.now_s()
+        known = None if self._before is None else self._before.robots.get(name)
+        told = await self._ask_motions(name, known.last_s if known else 0.0)
+        motions = [] if told is None else told.motions
+        if known is None:
+            is_lost = self._before is not None or any(one.command != Halt.word() for one in motions)
+            spreads = (LOST_M, math.pi) if is_lost else (PLACED_M, PLACED_RAD)
+            last = (motions[-1].number, motions[-1].at_s) if motions else (0, now_s)
+            known = Known(Belief(self._homes[name], now_s, *spreads), STILL, *last)
+            if is_lost:
+                self.publish_event(name, f"is at a place that {self.name} does not know", LogLevel.WARNING)
+        self._robots[name] = MotionTrack(known)
+        if told is not None:
+            self._robots[name].recover(told)
 
     def _keep(self, now_s: float) -> None:
         if self._file is None:
             return
-        robots = {
-            name: Known(robot.believe(now_s), self._numbers[name], robot.is_moving)
-            for name, robot in self._robots.items()
-        }
+        robots = {name: robot.known(now_s) for name, robot in self._robots.items()}
         try:
             self._file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            replace_file(self._file, msgspec.msgpack.encode(Memory(now_s, robots)), is_lasting=False)
+            replace_file(self._file, msgspec.msgpack.encode(Memory(robots)), is_lasting=False)
         except OSError as error:
             log.warning("%s: the beliefs are not kept: %s", self._file, error)
 
@@ -313,4 +321,4 @@ def _read(file: Path | None) -> Memory | None:
         return msgspec.msgpack.decode(file.read_bytes(), type=Memory)
     except (OSError, msgspec.DecodeError) as error:
         log.error("%s: %s", file, error)
-        return Memory(0.0, {})  # an earlier process existed, so all places are unknown
+        return Memory({})  # an earlier process existed, so all places are unknown

@@ -3,7 +3,8 @@
 * decision process → ARC: ``ArcQuestion``, and the commands of its kind (``commands``); ARC → decision process:
   ``ArcNotice``.
 * robot RC → command radio RC: ``LoadPacket``; command radio RC → robot RCs: ``Reply``, published.
-* robot RC → everybody: ``Readings``, published when they change, and the answer to ``AskReadings``.
+* robot RC → everybody: ``Readings``, published when they change, and the answer to ``AskReadings``; its motions, see
+  ``published_motions``.
 * framegrabber RC → subscribers of its ARC: ``Frame``, published under the ARC's address.
 """
 
@@ -119,7 +120,7 @@ class Applied(Message, frozen=True):
         at_s: Mission time.
         command: The command's ``word``.
         values: Applied values, clipped to the hardware's limits, with units in their names.
-        number: Number of commands that the RC has applied until then; only in publications.
+        number: Of the motions that this process of the RC has published: 1 for the first; 0 in answers.
     """
 
     rc: Mention

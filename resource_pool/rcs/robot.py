@@ -27,6 +27,7 @@ from resource_pool.commands import Command, Halt, SwitchTransmitter
 from resource_pool.drivers.interface import ReplyReader, RobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, AskReadings, LoadPacket, NotFromYou, PacketLoaded
+from resource_pool.published_motions import AskMotions, PublishedMotions
 from resource_pool.rc_parameters import RobotParameters
 from resource_pool.resource_controller import ResourceController
 from resource_pool.returned_numbers import applied_values, as_declared
@@ -73,7 +74,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        own = EmergencyQuestion | AskReadings
+        own = EmergencyQuestion | AskMotions | AskReadings
         cls.accepts = cls.accepts | own if cls.accepts is not None else own
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
@@ -89,6 +90,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._at_rest_s = self._born_s + max(self.moves_on_s, COMMAND_TIMEOUT_S)
         self._frequency = ""
         self._timeouts = 0
+        self._motions = PublishedMotions(bus, self._born_s)
         self._stop_file = StopFile(launch.run_directory, self.name)
         self._latch = StopLatch(self.name, self._stop_file.read())
         self._repeating: asyncio.Task[None] | None = None
@@ -141,6 +143,8 @@ class RobotRc(ResourceController[P], Generic[P]):
                 return self._latch.state
             case AskReadings():
                 return self._reports.readings()
+            case AskMotions(since_s=since_s):
+                return self._motions.since(since_s)
             case EmergencyStop() | LiftStop() if not asked.source.startswith(OPERATORS):
                 self.refused_strangers += 1
                 self.story.note(self.name, f"{asked.source} was refused: {type(asked.body).__name__}")
@@ -164,8 +168,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         done = await super().command(asked)
         if isinstance(done, Applied):
             motion = applied_values(self.motion_of(done.values), done.command, self.motion_of)
-            told = msgspec.structs.replace(done, values=done.values | motion, number=self.applied)
-            self.bus.publish(self.address, Conversation.MOTIONS, told)
+            self._motions.publish(msgspec.structs.replace(done, values=done.values | motion))
         return done
 
     def permit(self, order: Command) -> None:
@@ -304,8 +307,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     def _tell_halted(self, hold: Hold) -> None:
         """Publish that the robot was halted without a command."""
-        halted = Applied(self.name, hold.epoch, self.clock.now_s(), Halt.word(), number=self.applied)
-        self.bus.publish(self.address, Conversation.MOTIONS, halted)
+        self._motions.publish(Applied(self.name, hold.epoch, self.clock.now_s(), Halt.word()))
 
     def _publish_stop(self, news: str) -> None:
         """Publish the stop, and news if any, before its operator has the answer: this host may die the next moment."""

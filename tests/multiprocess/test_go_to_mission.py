@@ -59,26 +59,35 @@ async def test_a_scout_goes_to_its_place_and_home_by_dead_reckoning() -> None:
 
 
 @pytest.mark.thorough
-async def test_a_localizer_that_is_killed_on_the_way_is_back_and_the_scout_gets_there(tmp_path: Path) -> None:
-    """It missed no command: without an answer of the localizer the behavior gave none."""
-    alone = tmp_path / "alone.xml"
+async def test_a_localizer_that_is_killed_on_the_way_misses_no_motion_and_the_scout_gets_there(tmp_path: Path) -> None:
+    """It is killed while the Scout turns towards its place; a second localizer, which lives on, is the measure."""
+    two = tmp_path / "two.xml"
+    whole = '<resource type="localizer" name="localizer" process="hardware"/>'
+    alone = '<resource type="localizer" name="localizer"/><resource type="localizer" name="second"/>'
     text = GO_TO.read_text(encoding="utf-8")
-    alone.write_text(text.replace('name="localizer" process="hardware"', 'name="localizer"'), encoding="utf-8")
-    with mission_up(mission_xml=alone) as mission:
+    assert whole in text
+    two.write_text(text.replace(whole, alone), encoding="utf-8")
+    with mission_up(mission_xml=two) as mission:
         async with mission.bus() as bus:
             ends_s = time.monotonic() + THERE_WITHIN_S
-            while away_m(await truth(bus), HOME) < 0.5:
+            while (await truth(bus)).heading_rad > math.pi / 2 - 0.2:
                 assert time.monotonic() < ends_s, mission.story()
-                await asyncio.sleep(0.1)
+                await asyncio.sleep(0.02)
             os.kill(mission.component("localizer")["pid"], signal.SIGKILL)
             nearest_m = math.inf
             while True:
                 nearest_m = min(nearest_m, away_m(await truth(bus), GOAL))
                 errand = await bus.ask("mission_control/errand", AskBehavior(), BehaviorState, within_s=2)
-                if errand.status.is_final or nearest_m < 0.3:
+                if "go-out (go_to, priority 3): success" in errand.tree:
                     break
+                assert not errand.status.is_final, f"{errand}\n{mission.story()}"
                 assert time.monotonic() < ends_s, f"{errand}\n{mission.story()}"
                 await asyncio.sleep(0.2)
+            killed, second = [
+                await bus.ask(f"resource_pool/{one}", AskPose("scout1"), Pose, within_s=2)
+                for one in ("localizer", "second")
+            ]
         assert mission.component("localizer")["restarts"] == 1
-        assert not errand.status.is_final, f"{errand}\n{mission.story()}"
-        assert nearest_m < 0.4
+        assert away_m(killed, (second.x_m, second.y_m)) < 0.02, (killed, second)
+        assert math.cos(killed.heading_rad - second.heading_rad) > math.cos(0.02), (killed, second)
+        assert nearest_m < 0.4  # as of a localizer that lives

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,13 @@ import msgspec
 import pytest
 
 from backbone.bus.clock import run_virtual
+from backbone.bus.neighbor_declarations import Listening
 from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission_bytes
 from backbone.mission.report import MissionInvalid
 from backbone.placer.messages import Start
-from backbone.wire import Message
+from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
 from resource_pool.dead_reckoning import JUMP_M
 from resource_pool.localization import (
@@ -33,8 +34,8 @@ from resource_pool.localization import (
     ShapeKind,
     UnknownPlace,
 )
-from resource_pool.localizer import LOST_M, PLACED_M, UNSEEN_M_S, Localizer, LocalizerParameters
-from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, Readings
+from resource_pool.localizer import LOST_M, PLACED_M, Localizer, LocalizerParameters
+from resource_pool.messages import Applied, Readings
 
 LOCALIZER, WORLD, SCOUT = "resource_pool/localizer", "resource_pool/world", "resource_pool/scout1"
 
@@ -287,31 +288,61 @@ def test_without_a_memory_a_restarted_localizer_is_sure_of_no_robot_that_was_mov
     run_virtual(scene())
 
 
-@pytest.mark.parametrize("missed", [0, 3, 1000])
-def test_a_restarted_localizer_continues_from_what_it_kept_less_sure_by_what_it_missed(
-    tmp_path: Path, missed: int
+@pytest.mark.parametrize("runs_s", [0.4, 1.0, 5.0])
+@pytest.mark.parametrize("dead_s", [0.0, 0.3, 1.0, 20.0])
+def test_a_restarted_localizer_misses_no_motion(tmp_path: Path, runs_s: float, dead_s: float) -> None:
+    async def scene() -> None:
+        async with up(mission(PATROL % "world")) as running:
+            async with another(running, tmp_path):
+                await running.clock.sleep_s(runs_s)
+            await running.clock.sleep_s(dead_s)
+            async with another(running, tmp_path) as other:
+                after, lasting = await ask(running, AskPose("scout1"), Pose, other), await believed(running)
+                assert error_m(after, lasting) < 0.01
+                assert math.cos(after.heading_rad - lasting.heading_rad) > math.cos(0.02)
+
+    run_virtual(scene())
+
+
+@contextmanager
+def deaf(running: RunningMission, listener: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Deliver no publication to this address; afterwards its watchers get the tokens anew, as after a cut."""
+    network = running.network
+    carry = network.carry_publication
+
+    def carry_to_others(listening: Listening, address: str, envelope: Envelope[Message]) -> None:
+        if listening.owner.source != listener:
+            carry(listening, address, envelope)
+
+    with monkeypatch.context() as cut:
+        cut.setattr(network, "carry_publication", carry_to_others)
+        yield
+    for watching in network.watchers:
+        if watching.owner.source == listener:
+            network.carry_life(watching, SCOUT, False)
+            network.carry_life(watching, SCOUT, True)
+
+
+@pytest.mark.parametrize("ends", [False, True])
+def test_after_a_cut_of_its_link_a_localizer_gets_the_motions_that_it_missed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, *, ends: bool
 ) -> None:
     async def scene() -> None:
-        async with up(mission()) as running:
-            async with another(running, tmp_path) as other:
-                for _ in range(20):
-                    applied(running, "move", forward_m_s=0.1, turn_rad_s=0.0)
-                    await running.clock.sleep_s(0.1)
-                applied(running, "halt")
-                await running.clock.sleep_s(2.0)
-                before = await ask(running, AskPose("scout1"), Pose, other)
-                assert before.y_m == pytest.approx(1.2)
-            scout: Any = running.component("scout1")
-            scout.applied += missed
+        async with up(mission(PATROL % "world")) as running, another(running, tmp_path) as other:
             await running.clock.sleep_s(3.0)
-            async with another(running, tmp_path) as other:
-                after = await ask(running, AskPose("scout1"), Pose, other)
-                assert error_m(before, after) == 0
-                can_be_s = min(after.at_s - before.at_s, missed * COMMAND_TIMEOUT_S)
-                assert after.spread_m == pytest.approx(before.spread_m + UNSEEN_M_S * can_be_s, abs=0.6)
-                assert (after.spread_m > before.spread_m) == (after.spread_rad > before.spread_rad) == (missed > 0)
-                home = await ask(running, AskHome("scout1"), Pose, other)
-                assert (home.x_m, home.y_m) == (1, 1)
+            with deaf(running, other, monkeypatch):
+                await running.clock.sleep_s(6.0)
+                if ends:
+                    await running.stop("patrol")
+                    await running.clock.sleep_s(1.0)
+                wrong_m = error_m(await ask(running, AskPose("scout1"), Pose, other), await believed(running))
+                assert wrong_m > 0.3
+            await running.clock.sleep_s(0.5)
+            after, lasting = await ask(running, AskPose("scout1"), Pose, other), await believed(running)
+            assert (after.x_m, after.y_m, after.heading_rad) == pytest.approx(
+                (lasting.x_m, lasting.y_m, lasting.heading_rad), abs=0.01
+            )
+            assert after.spread_m == pytest.approx(lasting.spread_m, rel=0.1)
 
     run_virtual(scene())
 
