@@ -11,7 +11,6 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Iterable
-from types import TracebackType
 
 from backbone.addresses import COMPONENT_DATABASE, LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -44,9 +43,18 @@ from backbone.picture.reasons import reasons_for
 from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
-from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_readings, watch_stops
+from resource_pool.arc_client import (
+    StopState,
+    ask_readings,
+    ask_stop,
+    lift_stop,
+    stop_robot,
+    watch_readings,
+    watch_stops,
+)
 from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said, failed
 from ui_console.model.tree_board import is_behavior
+from ui_console.session.missing_answers import Answered, quietly
 from ui_console.session.unanswered_stops import UnansweredStops
 
 log = logging.getLogger(__name__)
@@ -190,9 +198,9 @@ class ConsoleFeed:
             return True
         return False
 
-    def _showing_failure(self) -> _Answered:
+    def _showing_failure(self) -> Answered:
         """Show a refusal or a missing answer that ends the block."""
-        return _Answered(lambda error: self._show(failed(self._clock.now_s(), error)))
+        return Answered(lambda error: self._show(failed(self._clock.now_s(), error)))
 
     async def _stop(self, robot: str, reason: str, user: str) -> bool:
         self.unanswered.begin(robot)
@@ -244,7 +252,7 @@ class ConsoleFeed:
             robots = [component_of(one.address) for one in listing.components if one.is_robot]
             await asyncio.gather(
                 *map(self._ask_how_it_went, behaviors),
-                *map(self._ask_stop, robots),
+                *map(self._ask_robot, robots),
                 self._ask_log(),
             )
 
@@ -254,7 +262,7 @@ class ConsoleFeed:
 
     async def _ask_how_it_went(self, behavior: str) -> None:
         """Show the end of a behavior that finished before this console subscribed."""
-        with _quietly(behavior, "did not answer with its story"):
+        with quietly(behavior, "did not answer with its story"):
             story = await self._bus.ask(behavior, AskStory(), Story, within_s=REPLY_TIME_S)
             for event in story.events:
                 if event.what.startswith("finished: "):
@@ -262,7 +270,7 @@ class ConsoleFeed:
 
     async def _ask_log(self) -> None:
         """Show the events from before this console subscribed, or from the time its link was down."""
-        with _quietly("the launcher", "did not answer with its log"):
+        with quietly("the launcher", "did not answer with its log"):
             self._hear(await self._bus.ask(LAUNCHER, AskPeople(), PeopleKnown, within_s=REPLY_TIME_S))
             self._hear(await self._bus.ask(LAUNCHER, AskLog(most=LOG_KEPT), Log, within_s=REPLY_TIME_S))
 
@@ -272,16 +280,21 @@ class ConsoleFeed:
             if address == COMPONENT_DATABASE:
                 await self._ask_types()
             else:
-                await self._ask_stop(component_of(address))
+                await self._ask_robot(component_of(address))
 
     async def _ask_types(self) -> None:
         """Show the reports of the kinds of robots, with units and ranges."""
-        with _quietly(COMPONENT_DATABASE, "did not answer with its types"):
+        with quietly(COMPONENT_DATABASE, "did not answer with its types"):
             self._hear(await self._bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S))
 
-    async def _ask_stop(self, robot: str) -> None:
-        with _quietly(robot, "did not answer with its stop"):  # a robot of another make may know no such stop
+    async def _ask_robot(self, robot: str) -> None:
+        """Show stop and readings, which are published when they change."""
+        with quietly(robot, "did not answer with its stop"):  # a robot of another make may know no such stop
             self._hear(await ask_stop(self._bus, robot))
+        with quietly(robot, "did not answer with its readings"):
+            readings = await ask_readings(self._bus, robot)
+            if readings.at_s >= 0:
+                self._hear(readings)
 
     async def _feel_link(self) -> None:
         while True:
@@ -310,7 +323,7 @@ class ConsoleFeed:
 
     async def _count(self, radio: str) -> None:
         address = f"{Subsystem.RESOURCE_POOL}/{radio}"
-        with _quietly(radio, "did not answer with its counters"):
+        with quietly(radio, "did not answer with its counters"):
             self._hear(await self._bus.ask(address, AskStatistics(), Statistics, within_s=REPLY_TIME_S), address)
 
     def _heard_nameserver(self, envelope: Envelope[Message]) -> None:
@@ -365,27 +378,3 @@ class ConsoleFeed:
         self._show_link()
         if came_back:
             self._listing.set()
-
-
-class _Answered:
-    """Ends its block at a refusal or a missing answer."""
-
-    def __init__(self, failed: Callable[[Refusal | LinkError], None]) -> None:
-        self._failed = failed
-
-    def __enter__(self) -> None:
-        """Begin."""
-
-    def __exit__(
-        self, _kind: type[BaseException] | None, error: BaseException | None, _at: TracebackType | None
-    ) -> bool:
-        """Suppress the error with which ``failed`` was called, and no other."""
-        if isinstance(error, Refusal | LinkError):
-            self._failed(error)
-            return True
-        return False
-
-
-def _quietly(name: str, what: str) -> _Answered:
-    """Log a refusal or a missing answer that ends the block, and continue without the answer."""
-    return _Answered(lambda error: log.info("%s %s: %s", name, what, error))

@@ -26,7 +26,7 @@ from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.requests import Lease
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
-from resource_pool.messages import Readings
+from resource_pool.messages import AskReadings, Readings
 from resource_pool.robots.rover.report import RoverReport
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
@@ -61,14 +61,17 @@ class Robot(Component[Any]):
     """Only stops and moves again; silent on request."""
 
     is_robot = True
-    accepts = AskStop | EmergencyStop | LiftStop
+    accepts = AskStop | AskReadings | EmergencyStop | LiftStop
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
         self.latch = StopLatch(self.name)
+        self.readings = Readings(self.name, -1.0)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         match asked.body:
+            case AskReadings():
+                return self.readings
             case EmergencyStop(reason=reason, user=user):
                 self.latch.stop(user, reason, self.clock.now_s())
             case LiftStop(number=number, user=user):
@@ -214,6 +217,24 @@ def test_what_robots_report_is_asked_of_the_database_also_of_one_that_comes_late
             robot.bus.publish(robot.address, Conversation.READINGS, Readings("scout1", 1.0, {"lift": 0.25}))
             await on.until(lambda: on.model.robots(2.0)[0].gauges)
             assert [gauge.span for gauge in on.model.robots(2.0)[0].gauges] == ["0 to 1"]
+
+    stage(scene)
+
+
+@pytest.mark.parametrize("is_late", [False, True])
+def test_readings_from_before_it_heard_the_robot_are_asked_for(stage: Callable[[Scene], None], is_late: bool) -> None:
+    async def scene(on: Stage) -> None:
+        database = on.make(Database, Subsystem.BACKBONE, "component_database", "component_database")
+        robot = on.robot("scout1")
+        robot.readings = Readings("scout1", 0.0, {"lift": 0.25})
+        async with on.beside(on.manager()), on.beside(database), AsyncExitStack() as later:
+            if is_late:
+                await later.enter_async_context(on.beside(robot))
+            await later.enter_async_context(on.beside(on.observer()))
+            await on.until(lambda: "components" in on.words())
+            if not is_late:
+                await later.enter_async_context(on.beside(robot))
+            await on.until(lambda: on.model.robots(2.0) and on.model.robots(2.0)[0].gauges)
 
     stage(scene)
 
