@@ -39,11 +39,22 @@ class CommandingBehavior(Behavior[BehaviorParameters]):
     async def act(self) -> BehaviorStatus:
         """Command, ask, and pause, in turns."""
         with zenoh.open(client_config(self.launch.endpoint, secret_of(self.launch.run_directory))) as bare:
+            await self._wait_for_server(bare)
             while True:
                 assert self.arc is not None
                 self.commands_s.append(await timed_s(self.arc.drive(1.0, 1.0)))
                 self.bare_s.append(await timed_s(ask_bare(bare, bytes(64))))
                 await self.clock.sleep_s(PAUSE_S)
+
+    async def _wait_for_server(self, bare: zenoh.Session) -> None:
+        """Wait for the measuring process, which begins to answer bare questions after the mission is up."""
+        while True:
+            try:
+                await ask_bare(bare, bytes(64))
+            except ConnectionError:
+                await self.clock.sleep_s(PAUSE_S)
+            else:
+                return
 
     def statistics(self) -> dict[str, float]:
         """Return how many commands were answered, and the percentiles in seconds once one was."""

@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 import uvloop
 import zenoh
+from bare_hub import bare_hub
 from measuring import helper, line_of, percentile, report, summary, wait_for_end_of_input
 
 from backbone.authentication import socket_endpoint
@@ -68,7 +69,7 @@ def joined(folder: str, source: str) -> tuple[ZenohBus, zenoh.Session]:
 
 def be_hub(folder: str) -> None:
     """Run as the hub process."""
-    with zenoh.open(with_shared_memory(hub_settings([socket_endpoint(Path(folder))], ""))):
+    with bare_hub(with_shared_memory(hub_settings([socket_endpoint(Path(folder))], ""))):
         print("ready", flush=True)
         wait_for_end_of_input()
 

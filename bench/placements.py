@@ -29,6 +29,7 @@ from pathlib import Path
 import msgspec
 import uvloop
 import zenoh
+from bare_hub import bare_hub
 from measuring import helper, line_of, percentile, report, wait_for_end_of_input
 
 from backbone.authentication import socket_endpoint
@@ -219,7 +220,7 @@ async def send(folder: str, values: int) -> None:
 
 def be_hub(folder: str) -> None:
     """Run as the hub process."""
-    with zenoh.open(hub_config([socket_endpoint(Path(folder))])):
+    with bare_hub(hub_config([socket_endpoint(Path(folder))])):
         print("ready", flush=True)
         wait_for_end_of_input()
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import uvloop
 import zenoh
+from bare_hub import bare_hub
 from measuring import free_endpoint, helper, percentile, report, summary, wait_for_end_of_input
 
 from backbone.authentication import socket_endpoint
@@ -51,16 +52,24 @@ def serve_bare(session: zenoh.Session) -> None:
 
 
 async def ask_bare(session: zenoh.Session, payload: bytes) -> bytes:
-    """Ask on bare zenoh from the event loop."""
+    """Ask on bare zenoh from the event loop.
+
+    Raises:
+        ConnectionError: No process answers.
+    """
     loop = asyncio.get_running_loop()
     answered: asyncio.Future[zenoh.Reply] = loop.create_future()
 
     def arrived(reply: zenoh.Reply) -> None:
         loop.call_soon_threadsafe(answered.set_result, reply)
 
+    def over() -> None:
+        if not answered.done():
+            answered.set_exception(ConnectionError("no process answers"))
+
     session.get(
         BARE_KEY,
-        zenoh.handlers.Callback(arrived, lambda: None, indirect=False),
+        zenoh.handlers.Callback(arrived, lambda: loop.call_soon_threadsafe(over), indirect=False),
         payload=payload,
         timeout=WITHIN_S,
         express=True,
@@ -83,7 +92,7 @@ async def serve(endpoint: str) -> None:
 
 def be_hub(endpoint: str) -> None:
     """Run as the hub process."""
-    with zenoh.open(hub_config([endpoint])):
+    with bare_hub(hub_config([endpoint])):
         wait_for_end_of_input()
 
 
