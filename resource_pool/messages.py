@@ -120,7 +120,7 @@ class Applied(Message, frozen=True):
         at_s: Mission time.
         command: The command's ``word``.
         values: Applied values, clipped to the hardware's limits, with units in their names.
-        number: Of the motions that this process of the RC has published: 1 for the first; 0 in answers.
+        number: Of the motions that the RC has published: 1 for the first; 0 in answers.
     """
 
     rc: Mention

@@ -2,8 +2,8 @@
 
 Rules of this file:
 
-* A robot's RC numbers the motions that it publishes, and keeps the last ones. If a number is left out, motions were
-  lost on the way. Until they are recovered, later motions wait.
+* A robot's RC numbers the motions that it publishes, and keeps the last ones, also for its next process on the same
+  host. If a number is left out, motions were lost on the way. Until they are recovered, later motions wait.
 * Recovered motions count at their own times: the track goes back to the last motion before the gap, and adds the lost
   motions and all events since in the order of their times.
 * The spread grows by what a robot may have done in a time whose motions nobody has.
@@ -85,7 +85,8 @@ class MotionTrack:
         """Take a motion; if motions before it were lost, it waits for ``recover`` or ``give_up``.
 
         Args:
-            told: Not from the future. The number 1 is the first motion of a process of the RC, 0 one without number.
+            told: Not from the future. The number 1 is the first motion of an RC that knows of no earlier one; 0 is one
+                without a number.
         """
         if 0 < told.number <= self._number and told.at_s <= self._last_s:
             return  # recovered before it arrived
@@ -107,7 +108,7 @@ class MotionTrack:
         """
         is_same = not self._number or told.begun_s <= self._last_s
         number = self._number if is_same else 0
-        lost = [one for one in told.motions if one.number > number]
+        lost = [one for one in told.motions if (one.at_s, one.number) > (self._last_s, number)]
         if lost and lost[0].number > number + 1:
             unseen_until_s = lost[0].at_s
         else:

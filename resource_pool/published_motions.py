@@ -9,9 +9,11 @@ import msgspec
 
 from backbone.bus.interface import Bus
 from backbone.keys import Conversation
+from backbone.naming import component_of
 from backbone.ranges import MANY, Instant
 from backbone.wire import Message
 from resource_pool.messages import Applied
+from resource_pool.motion_file import MotionFile
 
 KEPT = 300  # chosen: half a minute of driving, longer than a localizer's restart or a cut of the network
 
@@ -30,8 +32,9 @@ class Motions(Message, frozen=True):
     """Answer to ``AskMotions``.
 
     Attributes:
-        begun_s: Mission time at which the process of the RC began.
-        motions: The last ones of this process, in order; the oldest may be missing.
+        begun_s: Mission time since which the RC knows all motions: the begin of its process, or of a former one on the
+            same host.
+        motions: The last ones, in order; the oldest may be missing.
     """
 
     begun_s: Instant
@@ -39,24 +42,33 @@ class Motions(Message, frozen=True):
 
 
 class PublishedMotions:
-    """The motions of one process of an RC.
+    """The motions of an RC, also those of its former processes on this host.
 
     Args:
         bus: The RC's.
         begun_s: Mission time at which the process began.
+        run_directory: The mission's folder on this host, in which the next process finds them; empty: it does not.
     """
 
-    def __init__(self, bus: Bus, begun_s: float) -> None:
+    def __init__(self, bus: Bus, begun_s: float, run_directory: str) -> None:
         self._bus = bus
-        self._begun_s = begun_s
-        self._number = 0
-        self._last: deque[Applied] = deque(maxlen=KEPT)
+        self._file = MotionFile(run_directory, component_of(bus.source))
+        self._begun_s, former = self._file.read() or (begun_s, [])
+        self._last = deque(former, maxlen=KEPT)
+        self._number = former[-1].number if former else 0
+        self._room = 0
 
     def publish(self, done: Applied) -> None:
         """Publish a motion under the next number, and keep it."""
         self._number += 1
         told = msgspec.structs.replace(done, number=self._number)
         self._last.append(told)
+        if self._room:
+            self._file.add(told)
+            self._room -= 1
+        else:
+            self._file.begin(self._begun_s, self._last)
+            self._room = KEPT
         self._bus.publish(self._bus.source, Conversation.MOTIONS, told)
 
     def since(self, at_s: float) -> Motions:

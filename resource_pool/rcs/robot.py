@@ -90,7 +90,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._at_rest_s = self._born_s + max(self.moves_on_s, COMMAND_TIMEOUT_S)
         self._frequency = ""
         self._timeouts = 0
-        self._motions = PublishedMotions(bus, self._born_s)
+        self._motions = PublishedMotions(bus, self._born_s, launch.run_directory)
         self._stop_file = StopFile(launch.run_directory, self.name)
         self._latch = StopLatch(self.name, self._stop_file.read())
         self._repeating: asyncio.Task[None] | None = None

@@ -59,14 +59,21 @@ async def test_a_scout_goes_to_its_place_and_home_by_dead_reckoning() -> None:
 
 
 @pytest.mark.thorough
-async def test_a_localizer_that_is_killed_on_the_way_misses_no_motion_and_the_scout_gets_there(tmp_path: Path) -> None:
-    """It is killed while the Scout turns towards its place; a second localizer, which lives on, is the measure."""
+@pytest.mark.parametrize("shared", [False, True])
+async def test_a_localizer_that_is_killed_on_the_way_misses_no_motion_and_the_scout_gets_there(
+    tmp_path: Path, *, shared: bool
+) -> None:
+    """It is killed while the Scout turns towards its place, alone or together with the robots' RCs.
+
+    A second localizer, which lives on, is the measure.
+    """
     two = tmp_path / "two.xml"
-    whole = '<resource type="localizer" name="localizer" process="hardware"/>'
-    alone = '<resource type="localizer" name="localizer"/><resource type="localizer" name="second"/>'
+    first = '<resource type="localizer" name="localizer" process="hardware"/>'
     text = GO_TO.read_text(encoding="utf-8")
-    assert whole in text
-    two.write_text(text.replace(whole, alone), encoding="utf-8")
+    assert first in text
+    killed_one = first if shared else first.replace(' process="hardware"', "")
+    second_one = '<resource type="localizer" name="second"/>'
+    two.write_text(text.replace(first, killed_one + second_one), encoding="utf-8")
     with mission_up(mission_xml=two) as mission:
         async with mission.bus() as bus:
             ends_s = time.monotonic() + THERE_WITHIN_S
