@@ -84,13 +84,18 @@ class Found:
 
     def adopted(self, resources: Mapping[str, Resource], now_s: float) -> list[tuple[float, Adopted]]:
         """Return the time of connection of each ARC with confirmed holds, in the order of these times."""
-        found = []
+        times = []
         for arc, current in self.arcs.items():
             if self.holds_rightly(arc):
                 granted_s = current.granted_s if 0.0 <= current.granted_s <= now_s else now_s
                 settle_s = max(resources[rc].connect_s for rc in current.epochs)
-                event = Adopted(current.request, current.epochs, granted_s)
-                found.append((max(0.0, granted_s - settle_s), event))
+                times.append((granted_s, max(0.0, granted_s - settle_s), arc))
+        found, newest = [], dict[str, int]()
+        for granted_s, connected_s, arc in sorted(times):
+            current = self.arcs[arc]
+            overtaken = [rc for rc, epoch in current.epochs.items() if epoch < newest.get(rc, 0)]
+            newest.update((rc, epoch) for rc, epoch in current.epochs.items() if rc not in overtaken)
+            found.append((connected_s, Adopted(current.request, current.epochs, granted_s, overtaken)))
         return sorted(found, key=lambda one: one[0])
 
 

@@ -93,7 +93,7 @@ class ArcEvents:
         arc = self._add(Requested(msgspec.structs.replace(request, idle=False), rcs))
         holders = [other for other in self._state.arcs.values() if other.holds]
         if self._table.usable(arc) and self._table.fits(arc, holders):
-            self._transitions.adopt(arc, event.epochs, event.granted_s)
+            self._transitions.adopt(arc, event)
         self._state.request_again(arc, request)
 
     def wanted(self, name: str) -> None:

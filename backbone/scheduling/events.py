@@ -96,11 +96,16 @@ class Requested(Message, frozen=True):
 
 
 class Adopted(Message, frozen=True):
-    """A restarted RC manager found an ARC that still holds its RCs by leases. Event time: their connection."""
+    """A restarted RC manager found an ARC that still holds its RCs by leases. Event time: their connection.
+
+    Attributes:
+        overtaken: Its RCs that another ARC was connected to later, and granted earlier because it settled faster.
+    """
 
     request: SchedulingRequest
     epochs: Annotated[dict[Mention, Epoch], FEW]
     granted_s: Instant
+    overtaken: Annotated[list[Mention], FEW] = []
 
 
 class Wanted(Message, frozen=True):

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from backbone.scheduling.entries import Afterwards, ArcEntry, OpenDecision
-from backbone.scheduling.events import Record, RevokeArc
+from backbone.scheduling.events import Adopted, Record, RevokeArc
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.rules import SchedulingRules
@@ -125,11 +125,12 @@ class Transitions:
         self.trace.record("grant", "its RCs have settled", arc=arc.name, epoch=newest)
         self._record_grid(arc)
 
-    def adopt(self, arc: ArcEntry, epochs: Mapping[str, int], granted_s: float) -> None:
+    def adopt(self, arc: ArcEntry, adopted: Adopted) -> None:
         """Adopt the slice that an earlier RC manager began, for a waiting ARC; the trace shows it at its true times."""
-        why = "it held its RCs when this RC manager started"
+        why, epochs, granted_s = "it held its RCs when this RC manager started", adopted.epochs, adopted.granted_s
+        newest = {rc: epoch for rc, epoch in epochs.items() if rc not in adopted.overtaken}
         self.trace.record("connect", why, arc=arc.name, epoch=dict(epochs))
-        self.trace.record("grant", why, t=granted_s, arc=arc.name, epoch=dict(epochs))
+        self.trace.record("grant", why, t=granted_s, arc=arc.name, epoch=newest)
         arc.epochs = dict(epochs)
         for rc, epoch in epochs.items():
             entry = self._state.rcs[rc]

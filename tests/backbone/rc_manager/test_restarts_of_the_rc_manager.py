@@ -72,6 +72,32 @@ def _require_a_revocation_for_capacity(trace: Path) -> None:
     assert check(lines) == []
 
 
+def test_the_trace_after_a_restart_shows_growing_epochs_also_if_a_short_settling_overtook_a_long_one(pool: Any) -> None:
+    """The radio's epoch of the one that settled longer was connected first, and granted last."""
+
+    async def main() -> Path:
+        async with pool() as here:
+            one, two = await here.arc("one"), await here.arc("two")
+            async with here.beside(here.manager()):
+                await one.ask_for(request("one", "left", "video", "radio"))
+                await here.clock.sleep_s(0.1)
+                await two.ask_for(request("two", "right", "radio"))
+                await here.clock.sleep_s(1.0)
+                assert two.granted_s < one.granted_s
+                assert two.epochs["radio"] > one.epochs["radio"]
+            async with here.beside(here.manager()):
+                await here.clock.sleep_s(8.0)
+                assert (one.is_open, two.is_open) == (True, True)
+            return here.trace
+
+    lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
+    begin = [line["ev"] for line in lines].index("meta", 1)
+    assert check(lines[:begin]) == []
+    assert check(lines[begin:]) == []
+    grants = [line["epoch"] for line in lines[begin:] if line["ev"] == "grant"]
+    assert [sorted(epochs) for epochs in grants] == [["left", "video"], ["radio", "right"]]
+
+
 def test_waiting_arcs_keep_their_places_in_line_over_a_restart(pool: Any) -> None:
     async def main() -> None:
         async with pool() as here:
