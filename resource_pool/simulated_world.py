@@ -2,7 +2,8 @@
 
 The world steps physics at the mission's pace and never skips a step. It catches up after a short delay, but not after a
 longer pause: then the world's time stays behind. While it caught up, robots would receive no packet and would stop by
-themselves. Once a frame the world publishes its state, from which other processes draw pictures.
+themselves. Once a frame the world publishes its state, from which other processes draw pictures. It also saves where
+the bodies are, so that a restart leaves the robots where they were.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from backbone.wire import Envelope, Message
 from resource_pool.drivers.world_messages import AskWorld, RadioPacket, ReplyOnAir, WorldModel, WorldState
 from resource_pool.floor_plans import plan_of
 from resource_pool.localization import AskFloorPlan, AskHome, AskPose, Pose
+from resource_pool.world_file import WorldFile
 from scout_model.air import antenna_m, distance_m
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
-from scout_model.errors import InvalidWorld, UnknownBody
+from scout_model.errors import InvalidWorld, UnknownBody, UnstableBody
 from scout_model.radio_air import RadioAir, Sent
 from scout_model.radio_link import packet_bits
 from scout_model.robot_trial import require_robot
@@ -70,6 +72,9 @@ class SimulatedWorld(Component[WorldParameters]):
         super().__init__(launch, bus, clock)
         described = self.parameters.world
         self._world = World(described)
+        self._file = WorldFile(launch.run_directory, self.name)
+        if (memory := self._file.read()) is not None:
+            self._world.resume(memory)
         self._antenna_m = antenna_m(described.air, described.width_m, described.depth_m)
         self._air = RadioAir(described.seed, described.air)
         self._replies = RadioAir(described.seed, described.air, "reply to ")
@@ -102,7 +107,7 @@ class SimulatedWorld(Component[WorldParameters]):
                 self._world.hear(packet.network_id, packet.payload)
                 if packet.asks:
                     self._reply(packet, due_s)
-            self._world.step_frame()
+            self._step()
             self._publish(frame, due_s)
             for reply in self._replies.arrived(due_s):
                 on_air = ReplyOnAir(reply.radio, reply.network_id, reply.payload, reply.number)
@@ -148,6 +153,15 @@ class SimulatedWorld(Component[WorldParameters]):
             "away_s": self._away_s,
             "frames": self._world.frame,
         }
+
+    def _step(self) -> None:
+        try:
+            self._world.step_frame()
+        except UnstableBody:
+            self._file.forget()  # the next process begins anew
+            raise
+        if not self._world.stands or self._world.frame % FRAMES_PER_S == 0:
+            self._file.write(self._world.memory())
 
     def _hear(self, envelope: Envelope[RadioPacket]) -> None:
         packet = envelope.body

@@ -10,19 +10,21 @@ body touches it or an actuator gets a control other than 0.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
+import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scout_model.battery import Battery
 from scout_model.carrier import CarriedPose, trips
 from scout_model.composition import compose, model_of
-from scout_model.description import RobotPlace, WorldDescription
+from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.readings import Senses, parts_by_robot
-from scout_model.robot import AnsweringRobot, Robot, answering, fit_battery, robot_class
+from scout_model.robot import PoweredRobot
+from scout_model.robot_body import RobotBody, body_of
 from scout_model.scout import Scout, Spring
 from scout_model.stability import Stability
 from scout_model.targets import Route, TargetState, part_poses, parts
@@ -30,36 +32,19 @@ from scout_model.targets import Route, TargetState, part_poses, parts
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """The part of MuJoCo's state that determines a picture."""
 
-_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
-_BALL = int(mujoco.mjtJoint.mjJNT_BALL)
-_SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
-_POSITIONS = {_FREE: 7, _BALL: 4, _SLIDE: 1, _HINGE: 1}
-_VELOCITIES = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
 
-
-@dataclass(frozen=True, slots=True)
-class _Body:
-    """A robot's program, and the places of its parts in MuJoCo's arrays.
+class WorldMemory(msgspec.Struct, frozen=True):
+    """What a world saves for the next process that simulates it.
 
     Attributes:
-        kind: Class path, for refusals.
-        program: The on-board program.
-        answers: The same program, if it is an ``AnsweringRobot``.
-        actuators: Name → index of its control.
-        free: First of the seven numbers of its position.
-        positions: Its part of the positions.
-        velocities: Its part of the velocities.
-        controls: What drives its actuators now.
+        frame: Frames stepped.
+        positions: Robot → positions of its joints.
+        charges: Robot with a battery → its charge, 0 to 1.
     """
 
-    kind: str
-    program: Robot
-    answers: AnsweringRobot | None
-    actuators: dict[str, int]
-    free: int
-    positions: slice
-    velocities: slice
-    controls: dict[str, float] = field(default_factory=dict)
+    frame: int
+    positions: dict[str, list[float]]
+    charges: dict[str, float]
 
 
 class World:
@@ -87,7 +72,8 @@ class World:
         actuators = parts_by_robot(self._model.actuator(actuator).name for actuator in range(self._model.nu))
         roots = self._model.body_rootid[self._model.jnt_bodyid]
         self._robots = {
-            place.name: self._body(place, actuators.get(place.name, {}), roots) for place in description.robots
+            place.name: body_of(self._model, place, actuators.get(place.name, {}), roots)
+            for place in description.robots
         }
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.robots}
         self._trips = trips(description)
@@ -114,6 +100,37 @@ class World:
     def time_s(self) -> float:
         """World time: frames stepped so far, in seconds."""
         return self.frame / FRAMES_PER_S
+
+    @property
+    def stands(self) -> bool:
+        """True if no robot moved in the last frame."""
+        return self._stands
+
+    def memory(self) -> WorldMemory:
+        """Return what to save now."""
+        programs = {name: robot.program for name, robot in self._robots.items()}
+        return WorldMemory(
+            self.frame,
+            {name: self._data.qpos[robot.positions].tolist() for name, robot in self._robots.items()},
+            {name: one.battery.share(self.time_s) for name, one in programs.items() if isinstance(one, PoweredRobot)},
+        )
+
+    def resume(self, memory: WorldMemory) -> None:
+        """Continue from an earlier world of the same description, with robots at rest; only at frame 0.
+
+        A robot that the earlier world did not have, or whose body has other joints by now, stays where it is.
+        """
+        self.frame, self._step = memory.frame, memory.frame * STEPS_PER_FRAME
+        self._place_targets()
+        self._hold_carried()
+        for name, robot in self._robots.items():
+            positions = memory.positions.get(name, [])
+            if name not in self._carried and len(positions) == len(self._data.qpos[robot.positions]):
+                self._data.qpos[robot.positions] = positions
+            if name in memory.charges and isinstance(robot.program, PoweredRobot):
+                robot.program.battery = Battery(robot.program.battery.capacity_j, memory.charges[name])
+        mujoco.mj_forward(self._model, self._data)
+        self._senses.update(self.time_s)
 
     def hear(self, network_id: int, payload: bytes) -> None:
         """Deliver a radio packet: the robot with this id obeys it from the next frame on.
@@ -275,7 +292,7 @@ class World:
         """
         return self._scout(robot).spring
 
-    def _robot(self, name: str) -> _Body:
+    def _robot(self, name: str) -> RobotBody:
         robot = self._robots.get(name)
         if robot is None:
             raise UnknownBody(f"no robot named {name!r}")
@@ -287,36 +304,10 @@ class World:
             raise UnknownBody(f"no Scout named {name!r}")
         return program
 
-    def _body(self, place: RobotPlace, actuators: dict[str, int], roots: NDArray[np.int32]) -> _Body:
-        """Return the robot at this place.
-
-        Args:
-            place: Its declaration.
-            actuators: Name → number.
-            roots: Root of the tree of bodies of each joint of the world.
-        """
-        name, kind, model = place.name, place.kind, self._model
-        free = model.joint(f"{name}/free")
-        last = np.flatnonzero(roots == roots[free.id])[-1]
-        last_position = int(model.jnt_qposadr[last]) + _POSITIONS[int(model.jnt_type[last])]
-        last_velocity = int(model.jnt_dofadr[last]) + _VELOCITIES[int(model.jnt_type[last])]
-        program = robot_class(kind)()
-        if place.battery_j is not None:
-            fit_battery(program, place.battery_j, kind)
-        return _Body(
-            kind=kind,
-            program=program,
-            answers=answering(program),
-            actuators=actuators,
-            free=int(free.qposadr[0]),
-            positions=slice(int(free.qposadr[0]), last_position),
-            velocities=slice(int(free.dofadr[0]), last_velocity),
-        )
-
     def _is_all_asleep(self) -> bool:
         return min(self._tree_asleep.tolist(), default=0) >= 0 and not np.count_nonzero(self._velocities)
 
-    def _drive(self, robot: _Body, now_s: float) -> bool:
+    def _drive(self, robot: RobotBody, now_s: float) -> bool:
         """Apply the robot program's outputs to the actuators; return whether any is not 0, which wakes the body."""
         controls = robot.program.controls(now_s)
         if controls != robot.controls:

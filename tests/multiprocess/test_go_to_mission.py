@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from running_mission import mission_up
+from running_mission import mission_up, status_when_settled
 
 from backbone.bus.interface import Bus
 from backbone.keys import Conversation
@@ -98,3 +98,29 @@ async def test_a_localizer_that_is_killed_on_the_way_misses_no_motion_and_the_sc
         assert away_m(killed, (second.x_m, second.y_m)) < 0.02, (killed, second)
         assert math.cos(killed.heading_rad - second.heading_rad) > math.cos(0.02), (killed, second)
         assert nearest_m < 0.4  # as of a localizer that lives
+
+
+@pytest.mark.thorough
+async def test_a_world_that_is_killed_leaves_the_robots_where_they_were() -> None:
+    with mission_up(mission_xml=GO_TO) as mission:
+        async with mission.bus() as bus:
+            ends_s = time.monotonic() + THERE_WITHIN_S
+            while away_m(before := await truth(bus), HOME) < 0.5:
+                assert time.monotonic() < ends_s, mission.story()
+                await asyncio.sleep(0.1)
+            os.kill(mission.component("world")["pid"], signal.SIGKILL)
+            await asyncio.to_thread(mission.wait_for_line, "world: fell", 10)
+            await asyncio.to_thread(status_when_settled, mission)
+            after = await truth(bus)
+            assert away_m(after, (before.x_m, before.y_m)) < 0.3, (before, after)  # it drove on for a moment
+            nearest_m = math.inf
+            while True:
+                nearest_m = min(nearest_m, away_m(await truth(bus), GOAL))
+                errand = await bus.ask("mission_control/errand", AskBehavior(), BehaviorState, within_s=2)
+                if "go-out (go_to, priority 3): success" in errand.tree:
+                    break
+                assert not errand.status.is_final, f"{errand}\n{mission.story()}"
+                assert time.monotonic() < ends_s, f"{errand}\n{mission.story()}"
+                await asyncio.sleep(0.2)
+        assert mission.component("world")["restarts"] == 1
+        assert nearest_m < 0.4
