@@ -75,6 +75,8 @@ class World:
             place.name: body_of(self._model, place, actuators.get(place.name, {}), roots)
             for place in description.robots
         }
+        programs = {name: robot.program for name, robot in self._robots.items()}
+        self._powered = {name: one for name, one in programs.items() if isinstance(one, PoweredRobot)}
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.robots}
         self._trips = trips(description)
         self._carried = {place.name: self._trips[place.carried_by] for place in description.robots if place.carried_by}
@@ -94,7 +96,7 @@ class World:
         self._hold_carried()
         mujoco.mj_forward(self._model, self._data)
         self._stability = Stability(self._model, self._data, {place.name: place.kind for place in description.robots})
-        self._senses = Senses(self._model, self._data, {name: robot.program for name, robot in self._robots.items()})
+        self._senses = Senses(self._model, self._data, programs)
 
     @property
     def time_s(self) -> float:
@@ -108,11 +110,11 @@ class World:
 
     def memory(self) -> WorldMemory:
         """Return what to save now."""
-        programs = {name: robot.program for name, robot in self._robots.items()}
+        positions, now_s = self._data.qpos.tolist(), self.time_s
         return WorldMemory(
             self.frame,
-            {name: self._data.qpos[robot.positions].tolist() for name, robot in self._robots.items()},
-            {name: one.battery.share(self.time_s) for name, one in programs.items() if isinstance(one, PoweredRobot)},
+            {name: positions[robot.positions] for name, robot in self._robots.items()},
+            {name: program.battery.share(now_s) for name, program in self._powered.items()},
         )
 
     def resume(self, memory: WorldMemory) -> None:
@@ -127,8 +129,9 @@ class World:
             positions = memory.positions.get(name, [])
             if name not in self._carried and len(positions) == len(self._data.qpos[robot.positions]):
                 self._data.qpos[robot.positions] = positions
-            if name in memory.charges and isinstance(robot.program, PoweredRobot):
-                robot.program.battery = Battery(robot.program.battery.capacity_j, memory.charges[name])
+        for name, program in self._powered.items():
+            if name in memory.charges:
+                program.battery = Battery(program.battery.capacity_j, memory.charges[name])
         mujoco.mj_forward(self._model, self._data)
         self._senses.update(self.time_s)
 
