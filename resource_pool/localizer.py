@@ -142,6 +142,7 @@ class Localizer(ResourceController[LocalizerParameters]):
             rc = address(Subsystem.RESOURCE_POOL, name)
             self.bus.subscribe(rc, Conversation.MOTIONS, Applied, self._applied)
             self.bus.watch_alive(rc, partial(self._rc_lives, name))
+        self.bus.watch_link(self._link_changed)
         watch_readings(self.bus, self._counted)
         sights = f"{Subsystem.MISSION_CONTROL}/*"
         self.bus.subscribe(sights, Conversation.SIGHTINGS, LandmarkSighting, self._sighted)
@@ -208,6 +209,13 @@ class Localizer(ResourceController[LocalizerParameters]):
         """Recover what was missed: the RC may have been cut off, or published its first motions before it was known."""
         if is_alive:
             self._recover_soon(robot)
+        else:
+            self._robots[robot].rc_left(self.clock.now_s())
+
+    def _link_changed(self, _is_up: bool) -> None:
+        """At both ends of a cut: tokens fall with the link although their processes live on."""
+        for robot in self._robots.values():
+            robot.was_deaf()
 
     def _recover_soon(self, robot: str) -> None:
         if robot not in self._recovering:

@@ -6,11 +6,13 @@ Rules of this file:
   host. If a number is left out, motions were lost on the way. Until they are recovered, later motions wait.
 * Recovered motions count at their own times: the track goes back to the last motion before the gap, and adds the lost
   motions and all events since in the order of their times.
-* The spread grows by what a robot may have done in a time whose motions nobody has.
+* The spread grows by what a robot may have done in a time whose motions nobody has. If an RC knows nothing of a former
+  process, that is the time from the last motion until this process left; a robot at rest does nothing meanwhile.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 
@@ -23,6 +25,7 @@ from resource_pool.published_motions import Motions
 
 UNSEEN_M_S = 0.2  # chosen: standard deviation of a speed of up to 0.35 m/s forward or backward
 UNSEEN_RAD_S = 0.9  # chosen: same, of up to 1.5 rad/s
+AT_REST_S = 3.0  # chosen: a driven robot has motions ten times a second, and a cut is seen after 2 s
 EVENTS_KEPT = 1000  # chosen: a minute of motions and sightings
 
 Event = Callable[[DeadReckoning], None]
@@ -54,6 +57,7 @@ class MotionTrack:
     def __init__(self, known: Known) -> None:
         self._reckoning = DeadReckoning(known.belief, known.motion)
         self._number, self._last_s = known.number, known.last_s
+        self._left_s = math.inf
         self._at_last = self._reckoning.copy()
         self._since: deque[tuple[float, Event]] = deque(maxlen=EVENTS_KEPT)
         self._waiting: deque[Applied] = deque(maxlen=EVENTS_KEPT)
@@ -100,6 +104,14 @@ class MotionTrack:
         event(self._reckoning)
         self._since.append((at_s, event))
 
+    def rc_left(self, now_s: float) -> None:
+        """Record that the RC's process left now, and that all of its motions were heard until then."""
+        self._left_s = self._last_s if now_s - self._last_s > AT_REST_S else now_s
+
+    def was_deaf(self) -> None:
+        """Record that motions may have been missed, and that the process of the RC may have left at any time."""
+        self._left_s = math.inf
+
     def recover(self, told: Motions) -> None:
         """Take the motions that were lost.
 
@@ -112,7 +124,7 @@ class MotionTrack:
         if lost and lost[0].number > number + 1:
             unseen_until_s = lost[0].at_s
         else:
-            unseen_until_s = self._last_s if is_same else told.begun_s
+            unseen_until_s = self._last_s if is_same else min(told.begun_s, self._left_s)
         self._again(lost, unseen_until_s)
 
     def give_up(self) -> None:

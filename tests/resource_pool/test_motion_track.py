@@ -163,6 +163,28 @@ def test_a_time_between_two_processes_of_the_rc_is_unknown_if_motions_were_lost(
     assert UNSEEN_M_S * unseen_s <= track.believe(14.1).spread_m < UNSEEN_M_S * unseen_s + 0.05
 
 
+@pytest.mark.parametrize(
+    ("left_s", "unseen_s"), [(11.05, 0.05), (13.0, 2.0), (30.0, 0.0)], ids=["it fell", "it was cut off", "at rest"]
+)
+def test_the_unknown_time_ends_when_the_former_process_left(left_s: float, unseen_s: float) -> None:
+    for lost in ([], [moving(1, 41.0, 0.0)]):
+        track = MotionTrack(msgspec.structs.replace(BEGIN, number=8))
+        track.moved(moving(9, 11.0, 0.0))
+        track.rc_left(left_s)
+        track.recover(Motions(40.0, lost))
+        assert not track.has_gap
+        assert track.believe(42.0).spread_m == pytest.approx(math.hypot(0.02, UNSEEN_M_S * unseen_s))
+
+
+def test_one_whose_link_was_cut_does_not_know_when_the_former_process_left() -> None:
+    track = MotionTrack(msgspec.structs.replace(BEGIN, number=8))
+    track.moved(moving(9, 11.0, 0.0))
+    track.rc_left(30.0)
+    track.was_deaf()
+    track.recover(Motions(40.0, []))
+    assert track.believe(42.0).spread_m == pytest.approx(math.hypot(0.02, UNSEEN_M_S * 29.0))
+
+
 def test_a_restarted_rc_without_a_motion_means_that_none_is_lost_after_its_begin() -> None:
     track = MotionTrack(BEGIN)
     track.moved(moving(5, 11.0))
