@@ -16,7 +16,6 @@ import base64
 import logging
 import math
 from functools import partial
-from pathlib import Path
 from typing import Annotated, ClassVar
 
 import msgspec
@@ -34,6 +33,7 @@ from resource_pool.begin_places import read_begins
 from resource_pool.commands import Halt
 from resource_pool.dead_reckoning import STILL, Belief, FloorPose
 from resource_pool.floor_plans import board, plan_of, sighted_from
+from resource_pool.kept_file import KeptFile
 from resource_pool.localization import AskFloorPlan, AskHome, AskPose, FloorPlan, LandmarkSighting, Pose, UnknownPlace
 from resource_pool.messages import Applied, Readings
 from resource_pool.motion_track import Known, MotionTrack
@@ -126,7 +126,7 @@ class Localizer(ResourceController[LocalizerParameters]):
         super().__init__(launch, bus, clock)
         self._plan = self.parameters.plan()
         self._homes = self.parameters.begins()
-        self._file = Path(launch.run_directory) / "localizers" / self.name if launch.run_directory else None
+        self._file = KeptFile(launch.run_directory, "localizers", self.name)
         self._before = _read(self._file)
         self._robots: dict[str, MotionTrack] = {}
         self._recovering: set[str] = set()
@@ -306,14 +306,12 @@ class Localizer(ResourceController[LocalizerParameters]):
             self._robots[name].recover(told)
 
     def _keep(self, now_s: float) -> None:
-        if self._file is None:
-            return
         robots = {name: robot.known(now_s) for name, robot in self._robots.items()}
         try:
-            self._file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            replace_file(self._file, msgspec.msgpack.encode(Memory(robots)), is_lasting=False)
+            if (target := self._file.target()) is not None:
+                replace_file(target, msgspec.msgpack.encode(Memory(robots)), is_lasting=False)
         except OSError as error:
-            log.warning("%s: the beliefs are not kept: %s", self._file, error)
+            log.warning("%s: the beliefs are not kept: %s", self._file.path, error)
 
 
 def _pose_of(body: str, belief: Belief) -> Pose:
@@ -321,12 +319,11 @@ def _pose_of(body: str, belief: Belief) -> Pose:
     return Pose(body, belief.at_s, at.x_m, at.y_m, at.heading_rad, belief.source, belief.spread_m, belief.spread_rad)
 
 
-def _read(file: Path | None) -> Memory | None:
+def _read(file: KeptFile) -> Memory | None:
     """Return the state saved by an earlier process of this localizer."""
-    if file is None or not file.exists():
-        return None
     try:
-        return msgspec.msgpack.decode(file.read_bytes(), type=Memory)
+        saved = file.read()
+        return None if saved is None else msgspec.msgpack.decode(saved, type=Memory)
     except (OSError, msgspec.DecodeError) as error:
-        log.error("%s: %s", file, error)
+        log.error("%s: %s", file.path, error)
         return Memory({})  # an earlier process existed, so all places are unknown

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from pathlib import Path
 
 import msgspec
 
 from backbone.atomic_file import replace_file
+from resource_pool.kept_file import KeptFile
 from resource_pool.stop_messages import StopState
 
 log = logging.getLogger(__name__)
@@ -22,22 +22,19 @@ class StopFile:
     """
 
     def __init__(self, run_directory: str, rc: str) -> None:
-        self._path = Path(run_directory) / "stops" / rc if run_directory else None
+        self._rc = rc
+        self._file = KeptFile(run_directory, "stops", rc)
 
     def read(self) -> StopState | None:
         """Return the saved state; None: none was saved. A file that cannot be read counts as a stop."""
-        if self._path is None:
-            return None
         try:
-            return msgspec.msgpack.decode(self._path.read_bytes(), type=StopState)
-        except (FileNotFoundError, NotADirectoryError):
-            return None
+            saved = self._file.read()
+            return None if saved is None else msgspec.msgpack.decode(saved, type=StopState)
         except (OSError, msgspec.DecodeError) as error:
-            log.error("%s: %s", self._path, error)
-            return StopState(self._path.name, True, 1, "unknown", "the file of an earlier stop cannot be read", 0.0)
+            log.error("%s: %s", self._file.path, error)
+            return StopState(self._rc, True, 1, "unknown", "the file of an earlier stop cannot be read", 0.0)
 
     def write(self, state: StopState) -> None:
-        """Replace the saved state, or raise ``OSError``."""
-        if self._path is not None:
-            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            replace_file(self._path, msgspec.msgpack.encode(state), is_lasting=False)
+        """Replace the saved state, or raise ``OSError``; nothing is saved once the mission has ended."""
+        if (target := self._file.target()) is not None:
+            replace_file(target, msgspec.msgpack.encode(state), is_lasting=False)

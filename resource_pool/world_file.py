@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from pathlib import Path
 
 import msgspec
 
 from backbone.atomic_file import replace_file
+from resource_pool.kept_file import KeptFile
 from scout_model.world import WorldMemory
 
 log = logging.getLogger(__name__)
@@ -22,32 +22,28 @@ class WorldFile:
     """
 
     def __init__(self, run_directory: str, world: str) -> None:
-        self._path = Path(run_directory) / "worlds" / world if run_directory else None
+        self._file = KeptFile(run_directory, "worlds", world)
+        self._is_kept = True
 
     def read(self) -> WorldMemory | None:
         """Return what an earlier process saved; None: nothing, or it cannot be read."""
-        if self._path is None:
-            return None
         try:
-            return msgspec.msgpack.decode(self._path.read_bytes(), type=WorldMemory)
-        except (FileNotFoundError, NotADirectoryError):
-            return None
+            saved = self._file.read()
+            return None if saved is None else msgspec.msgpack.decode(saved, type=WorldMemory)
         except (OSError, msgspec.DecodeError) as error:
-            log.warning("%s: the robots begin at their first places: %s", self._path, error)
+            log.warning("%s: the robots begin at their first places: %s", self._file.path, error)
             return None
 
     def write(self, memory: WorldMemory) -> None:
-        """Replace what is saved; after an error nothing more is."""
-        if self._path is None:
-            return
+        """Replace what is saved; after an error, or once the mission has ended, nothing more is."""
         try:
-            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            replace_file(self._path, msgspec.msgpack.encode(memory), is_lasting=False)
+            if self._is_kept and (target := self._file.target()) is not None:
+                replace_file(target, msgspec.msgpack.encode(memory), is_lasting=False)
         except OSError as error:
-            log.warning("%s: after a restart the robots begin where they are now: %s", self._path, error)
-            self._path = None
+            log.warning("%s: after a restart the robots begin where they are now: %s", self._file.path, error)
+            self._is_kept = False
 
     def forget(self) -> None:
         """Remove what is saved."""
-        if self._path is not None:
-            self._path.unlink(missing_ok=True)
+        if (path := self._file.path) is not None:
+            path.unlink(missing_ok=True)

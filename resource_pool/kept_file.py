@@ -1,0 +1,63 @@
+"""Kept file: what a component leaves in the mission's folder for its next process, but not for another mission.
+
+The folder of a mission that ends is renamed while its processes still run, and another mission of the same name may
+make a new one. So a process writes only into the folder that it found when it began.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class KeptFile:
+    """A file of one component.
+
+    Args:
+        run_directory: The mission's folder on this host; empty: nothing is kept.
+        kind: Folder in it.
+        name: Name of the component.
+    """
+
+    def __init__(self, run_directory: str, kind: str, name: str) -> None:
+        self._run_directory = Path(run_directory) if run_directory else None
+        self._kind = kind
+        self._name = name
+        self._found = _identity(self._run_directory)
+
+    @property
+    def path(self) -> Path | None:
+        """Path of the file; None: nothing is kept, or the mission has ended."""
+        if self._run_directory is None or self._found is None or _identity(self._run_directory) != self._found:
+            return None
+        return self._run_directory / self._kind / self._name
+
+    def read(self) -> bytes | None:
+        """Return the content; None: there is no file.
+
+        Raises:
+            OSError: The system refused.
+        """
+        path = self.path
+        try:
+            return None if path is None else path.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+
+    def target(self) -> Path | None:
+        """Return the path of the file, in a folder that exists; None: as for ``path``.
+
+        Raises:
+            OSError: The system refused.
+        """
+        path = self.path
+        if path is not None:
+            path.parent.mkdir(mode=0o700, exist_ok=True)
+        return path
+
+
+def _identity(folder: Path | None) -> tuple[int, int] | None:
+    try:
+        found = None if folder is None else folder.stat()
+    except OSError:
+        return None
+    return None if found is None else (found.st_dev, found.st_ino)
