@@ -26,10 +26,14 @@ class KeptFile:
 
     @property
     def path(self) -> Path | None:
-        """Path of the file; None: nothing is kept, or the mission has ended."""
+        """Path of the file; None: nothing is kept, or no longer, or the mission has ended."""
         if self._run_directory is None or self._found is None or _identity(self._run_directory) != self._found:
             return None
         return self._run_directory / self._kind / self._name
+
+    def give_up(self) -> None:
+        """Keep nothing from now on."""
+        self._found = None
 
     def read(self) -> bytes | None:
         """Return the content; None: there is no file.

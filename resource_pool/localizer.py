@@ -105,16 +105,6 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
         )
 
 
-class Memory(msgspec.Struct, frozen=True):
-    """The state that a localizer saves for its next process.
-
-    Attributes:
-        robots: Robot → what is known of it.
-    """
-
-    robots: dict[str, Known]
-
-
 class Localizer(ResourceController[LocalizerParameters]):
     """Answers ``AskPose``, ``AskHome`` and ``AskFloorPlan``, and publishes each pose that changes."""
 
@@ -291,7 +281,7 @@ class Localizer(ResourceController[LocalizerParameters]):
     async def _begin(self, name: str) -> None:
         """Continue from the saved knowledge, or begin at the start place of a robot that no command has moved yet."""
         now_s = self.clock.now_s()
-        known = None if self._before is None else self._before.robots.get(name)
+        known = None if self._before is None else self._before.get(name)
         told = await self._ask_motions(name, known.last_s if known else 0.0)
         motions = [] if told is None else told.motions
         if known is None:
@@ -309,7 +299,7 @@ class Localizer(ResourceController[LocalizerParameters]):
         robots = {name: robot.known(now_s) for name, robot in self._robots.items()}
         try:
             if (target := self._file.target()) is not None:
-                replace_file(target, msgspec.msgpack.encode(Memory(robots)), is_lasting=False)
+                replace_file(target, msgspec.msgpack.encode(robots), is_lasting=False)
         except OSError as error:
             log.warning("%s: the beliefs are not kept: %s", self._file.path, error)
 
@@ -319,11 +309,11 @@ def _pose_of(body: str, belief: Belief) -> Pose:
     return Pose(body, belief.at_s, at.x_m, at.y_m, at.heading_rad, belief.source, belief.spread_m, belief.spread_rad)
 
 
-def _read(file: KeptFile) -> Memory | None:
-    """Return the state saved by an earlier process of this localizer."""
+def _read(file: KeptFile) -> dict[str, Known] | None:
+    """Return what an earlier process of this localizer saved, by robot; None: there was no earlier process."""
     try:
         saved = file.read()
-        return None if saved is None else msgspec.msgpack.decode(saved, type=Memory)
+        return None if saved is None else msgspec.msgpack.decode(saved, type=dict[str, Known])
     except (OSError, msgspec.DecodeError) as error:
         log.error("%s: %s", file.path, error)
-        return Memory({})  # an earlier process existed, so all places are unknown
+        return {}  # an earlier process existed, so all places are unknown

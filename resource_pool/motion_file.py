@@ -24,7 +24,6 @@ class MotionFile:
 
     def __init__(self, run_directory: str, rc: str) -> None:
         self._file = KeptFile(run_directory, "motions", rc)
-        self._is_kept = True
 
     def read(self) -> tuple[float, list[Applied]] | None:
         """Return since when the motions are whole, and the motions; None: none were kept, or they cannot be read."""
@@ -42,7 +41,7 @@ class MotionFile:
     def begin(self, begun_s: float, motions: Iterable[Applied]) -> None:
         """Replace the file's content; once the mission has ended, nothing is kept."""
         try:
-            if self._is_kept and (target := self._file.target()) is not None:
+            if (target := self._file.target()) is not None:
                 lines = [msgspec.json.encode(begun_s), *map(msgspec.json.encode, motions), b""]
                 replace_file(target, b"\n".join(lines), is_lasting=False)
         except OSError as error:
@@ -51,7 +50,7 @@ class MotionFile:
     def add(self, motion: Applied) -> None:
         """Add a motion to the file; after an error nothing is kept."""
         try:
-            if self._is_kept and (path := self._file.path) is not None:
+            if (path := self._file.path) is not None:
                 with path.open("ab", buffering=0) as file:
                     file.write(msgspec.json.encode(motion) + b"\n")
         except OSError as error:
@@ -59,7 +58,8 @@ class MotionFile:
 
     def _give_up(self, error: OSError) -> None:
         """Remove the file: a motion is missing in it."""
-        path, self._is_kept = self._file.path, False
+        path = self._file.path
+        self._file.give_up()
         log.warning("%s: a restart of this RC will not know its motions: %s", path, error)
         try:
             if path is not None:

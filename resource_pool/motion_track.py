@@ -6,8 +6,9 @@ Rules of this file:
   host. If a number is left out, motions were lost on the way. Until they are recovered, later motions wait.
 * Recovered motions count at their own times: the track goes back to the last motion before the gap, and adds the lost
   motions and all events since in the order of their times.
-* The spread grows by what a robot may have done in a time whose motions nobody has. If an RC knows nothing of a former
-  process, that is the time from the last motion until this process left; a robot at rest does nothing meanwhile.
+* If no RC has the motions of some time, the spread grows by the ways and turns that are likely in that time. If an RC
+  has no record of its former process, this is the time from the last motion until that process left. A robot that was
+  at rest before does not move in it.
 """
 
 from __future__ import annotations
@@ -128,7 +129,7 @@ class MotionTrack:
         self._again(lost, unseen_until_s)
 
     def give_up(self) -> None:
-        """Take the motions that wait, because the RC does not tell those before them."""
+        """Take the motions that wait, because the RC does not return those before them."""
         if self._waiting:
             self._again(list(self._waiting), self._waiting[0].at_s)
 

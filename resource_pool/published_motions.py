@@ -1,4 +1,4 @@
-"""Published motions: what a robot's RC tells localizers, and keeps for those that miss a part of it."""
+"""Published motions: a robot's RC publishes each motion, and returns the last ones to localizers that missed some."""
 
 from __future__ import annotations
 

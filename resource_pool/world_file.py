@@ -23,7 +23,6 @@ class WorldFile:
 
     def __init__(self, run_directory: str, world: str) -> None:
         self._file = KeptFile(run_directory, "worlds", world)
-        self._is_kept = True
 
     def read(self) -> WorldMemory | None:
         """Return what an earlier process saved; None: nothing, or it cannot be read."""
@@ -37,11 +36,11 @@ class WorldFile:
     def write(self, memory: WorldMemory) -> None:
         """Replace what is saved; after an error, or once the mission has ended, nothing more is."""
         try:
-            if self._is_kept and (target := self._file.target()) is not None:
+            if (target := self._file.target()) is not None:
                 replace_file(target, msgspec.msgpack.encode(memory), is_lasting=False)
         except OSError as error:
             log.warning("%s: after a restart the robots begin where they are now: %s", self._file.path, error)
-            self._is_kept = False
+            self._file.give_up()
 
     def forget(self) -> None:
         """Remove what is saved."""

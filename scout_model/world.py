@@ -131,7 +131,7 @@ class World:
                 self._data.qpos[robot.positions] = positions
         for name, program in self._powered.items():
             if name in memory.charges:
-                program.battery = Battery(program.battery.capacity_j, memory.charges[name])
+                program.battery = Battery(program.battery.capacity_j, min(1.0, max(0.0, memory.charges[name])))
         mujoco.mj_forward(self._model, self._data)
         self._senses.update(self.time_s)
 

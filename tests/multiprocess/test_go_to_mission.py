@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from running_mission import mission_up, status_when_settled
+from running_mission import RunningMission, mission_up, status_when_settled
 
 from backbone.bus.interface import Bus
 from backbone.keys import Conversation
@@ -30,6 +30,19 @@ async def truth(bus: Bus) -> Pose:
 
 def away_m(at: Pose, place: tuple[float, float]) -> float:
     return math.hypot(at.x_m - place[0], at.y_m - place[1])
+
+
+async def goes_out(bus: Bus, mission: RunningMission, ends_s: float) -> float:
+    """Wait until the errand is at its place; return how near to it the Scout was meanwhile."""
+    nearest_m = math.inf
+    while True:
+        nearest_m = min(nearest_m, away_m(await truth(bus), GOAL))
+        errand = await bus.ask("mission_control/errand", AskBehavior(), BehaviorState, within_s=2)
+        if "go-out (go_to, priority 3): success" in errand.tree:
+            return nearest_m
+        assert not errand.status.is_final, f"{errand}\n{mission.story()}"
+        assert time.monotonic() < ends_s, f"{errand}\n{mission.story()}"
+        await asyncio.sleep(0.2)
 
 
 @pytest.mark.thorough
@@ -81,15 +94,7 @@ async def test_a_localizer_that_is_killed_on_the_way_misses_no_motion_and_the_sc
                 assert time.monotonic() < ends_s, mission.story()
                 await asyncio.sleep(0.02)
             os.kill(mission.component("localizer")["pid"], signal.SIGKILL)
-            nearest_m = math.inf
-            while True:
-                nearest_m = min(nearest_m, away_m(await truth(bus), GOAL))
-                errand = await bus.ask("mission_control/errand", AskBehavior(), BehaviorState, within_s=2)
-                if "go-out (go_to, priority 3): success" in errand.tree:
-                    break
-                assert not errand.status.is_final, f"{errand}\n{mission.story()}"
-                assert time.monotonic() < ends_s, f"{errand}\n{mission.story()}"
-                await asyncio.sleep(0.2)
+            nearest_m = await goes_out(bus, mission, ends_s)
             killed, second = [
                 await bus.ask(f"resource_pool/{one}", AskPose("scout1"), Pose, within_s=2)
                 for one in ("localizer", "second")
@@ -113,14 +118,6 @@ async def test_a_world_that_is_killed_leaves_the_robots_where_they_were() -> Non
             await asyncio.to_thread(status_when_settled, mission)
             after = await truth(bus)
             assert away_m(after, (before.x_m, before.y_m)) < 0.3, (before, after)  # it drove on for a moment
-            nearest_m = math.inf
-            while True:
-                nearest_m = min(nearest_m, away_m(await truth(bus), GOAL))
-                errand = await bus.ask("mission_control/errand", AskBehavior(), BehaviorState, within_s=2)
-                if "go-out (go_to, priority 3): success" in errand.tree:
-                    break
-                assert not errand.status.is_final, f"{errand}\n{mission.story()}"
-                assert time.monotonic() < ends_s, f"{errand}\n{mission.story()}"
-                await asyncio.sleep(0.2)
+            nearest_m = await goes_out(bus, mission, ends_s)
         assert mission.component("world")["restarts"] == 1
         assert nearest_m < 0.4
