@@ -4,8 +4,8 @@ Rules of this file:
 
 * A robot's RC numbers the motions that it publishes, and keeps the last ones, also for its next process on the same
   host. If a number is left out, motions were lost on the way. Until they are recovered, later motions wait.
-* Recovered motions count at their own times: the track goes back to the last motion before the gap, and adds the lost
-  motions and all events since in the order of their times.
+* Motions count at their own times, also those that arrive late or are recovered: the track goes back to the last motion
+  before them, and adds them and all events since in the order of their times.
 * If no RC has the motions of some time, the spread grows by the ways and turns that are likely in that time. If an RC
   has no record of its former process, this is the time from the last motion until that process left. A robot that was
   at rest before does not move in it.
@@ -98,7 +98,7 @@ class MotionTrack:
         if self._waiting or told.number not in (0, 1, self._number + 1):
             self._waiting.append(told)
         else:
-            self._take(told)
+            self._again([told], self._last_s)
 
     def happened(self, at_s: float, event: Event) -> None:
         """Take a count or a sighting."""

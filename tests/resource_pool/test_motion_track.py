@@ -86,6 +86,26 @@ def test_recovered_motions_count_as_if_they_had_arrived(course: list[tuple[float
     assert are_equal(whole.believe(end_s), gappy.believe(end_s))
 
 
+@given(courses, st.floats(0, 3), st.floats(0.01, 0.3))
+def test_motions_that_arrive_late_count_at_their_own_times(
+    course: list[tuple[float, Happening, bool]], late_s: float, looked_at_each_s: float
+) -> None:
+    """A cut shorter than the link's lease loses nothing: all that waited arrives at once."""
+    whole, late = MotionTrack(BEGIN), MotionTrack(BEGIN)
+    played = [one for one in numbered(course) if isinstance(one[1], Applied)]
+    now_s = BEGIN_S
+    for at_s, told, _ in played:
+        play(whole, at_s, told)
+        while now_s < at_s + late_s:
+            now_s += looked_at_each_s
+            late.believe(now_s)
+        play(late, at_s, told)
+    end_s = max(now_s, whole.last_s) + 1.0
+    one, other = whole.believe(end_s), late.believe(end_s)
+    assert one.pose.distance_m(other.pose) < 1e-6
+    assert math.cos(one.pose.heading_rad - other.pose.heading_rad) > 1 - 1e-9
+
+
 @given(courses, st.integers(0, 24), st.floats(0, 0.4))
 def test_a_track_that_ends_anywhere_is_continued_by_the_next(
     course: list[tuple[float, Happening, bool]], ends_after: int, later_s: float
