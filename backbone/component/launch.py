@@ -25,6 +25,8 @@ class Launch(Message, frozen=True):
             the shared process itself, and ``requester`` is its creator.
         incarnation: Id of this life of the component, ``<host>.<start of the creator>.<number>``, unique in the
             mission.
+        order_id: Id of its owner's order, unique in the mission. It is the same in all lives of the component until an
+            order stops it. Empty: the placer did not start it.
     """
 
     mission: Name
@@ -41,6 +43,7 @@ class Launch(Message, frozen=True):
     run_directory: Line = ""
     process: NameOrNone = ""
     incarnation: Mention = ""
+    order_id: Mention = ""
 
     @property
     def is_shared_process(self) -> bool:

@@ -75,6 +75,7 @@ class Spawn(Message, frozen=True):
         process: Name of the shared process; empty: a process of its own.
         alike_most: Most components of its type in one process, where the placer chooses the process; 1: it does not.
         declared: Class and parameters to use if the component is placed anew; None: these.
+        order_id: See ``Launch``.
     """
 
     subsystem: Subsystem
@@ -90,6 +91,7 @@ class Spawn(Message, frozen=True):
     process: NameOrNone = ""
     alike_most: Count = 1
     declared: DeclaredClass | None = None
+    order_id: Mention = ""
 
 
 class Spawned(Message, frozen=True):

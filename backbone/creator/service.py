@@ -202,16 +202,22 @@ class Creator(Component[CreatorParameters]):
             parameters=order.parameters,
             requester=order.requester,
             process=order.process,
+            order_id=order.order_id,
         )
         try:
             pid = await self._keeper.start(launch, order.policy, order.ready_within_s, order)
         except AlreadyHere:
-            if self._keeper.order(order.name) != order:
+            if not self._is_asked_again(order):
                 raise
-            pid = await self._keeper.wait_ready(order.name, order.ready_within_s)  # the same order, asked again
+            pid = await self._keeper.wait_ready(order.name, order.ready_within_s)
         self._spawned += 1
         self.story.note(order.name, f"is ready, pid {pid}, ordered by {order.requester or PLACER}")
         return Spawned(launch.address, pid)
+
+    def _is_asked_again(self, order: Spawn) -> bool:
+        """Return whether the component runs by the same order; a restarted placer may ask with another id."""
+        present = self._keeper.order(order.name)
+        return present is not None and msgspec.structs.replace(present, order_id=order.order_id) == order
 
     def _refuse_strangers(self, asked: Envelope[Message]) -> None:
         if asked.source != PLACER:

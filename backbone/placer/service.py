@@ -12,7 +12,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import AsyncExitStack
 from functools import partial
-from itertools import chain, repeat
+from itertools import chain, count, repeat
 from typing import Annotated, assert_never
 
 import msgspec
@@ -96,6 +96,7 @@ class Placer(Component[PlacerParameters]):
         )
         self._start_up = BringUp(self._creators, note=self.story.note, is_meeting=self._meetings.are_under_way)
         self._type_locks: dict[str, asyncio.Lock] = {}
+        self._orders = count(1)
         self._starts = self._refused = self._again = self._stops = self._orphans = 0
 
     async def connect(self) -> None:
@@ -169,7 +170,8 @@ class Placer(Component[PlacerParameters]):
             self._book.refuse_second(component_type, name)
             if component_type.multiplicity is Multiplicity.MANY:
                 await alone.aclose()
-            spawn = _spawn(name, order, component_type, requester)
+            order_id = f"{self.start_number}.{next(self._orders)}"
+            spawn = _spawn(name, order, component_type, requester, order_id)
             if not spawn.process and self.parameters.packs is None:
                 spawn = msgspec.structs.replace(spawn, alike_most=component_type.alike_most)
             elif not spawn.process and component_type.shares_process and self.parameters.packs:
@@ -352,7 +354,7 @@ class Placer(Component[PlacerParameters]):
         self.story.note(name, f"was ended on {host}, by {by}")
 
 
-def _spawn(name: str, order: Start, component_type: ComponentType, requester: str) -> Spawn:
+def _spawn(name: str, order: Start, component_type: ComponentType, requester: str, order_id: str) -> Spawn:
     return Spawn(
         subsystem=component_type.subsystem,
         name=name,
@@ -364,4 +366,5 @@ def _spawn(name: str, order: Start, component_type: ComponentType, requester: st
         pinned=bool(order.host),
         tags=sorted({*component_type.tags, *order.tags}),
         process=order.process,
+        order_id=order_id,
     )

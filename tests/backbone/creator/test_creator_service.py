@@ -154,6 +154,7 @@ def test_the_same_order_twice_starts_one_process_and_another_of_that_name_is_ref
     async def body(host: Host) -> None:
         first = await host.spawn(order("Quiet", "scout1"))
         assert await host.spawn(order("Quiet", "scout1")) == first
+        assert await host.spawn(order("Quiet", "scout1", order_id="of another placer")) == first
         with pytest.raises(AlreadyHere):
             await host.spawn(order("Quiet", "scout1", requester="ui_console/other"))
         assert host.zygote.forked == ["scout1"]

@@ -304,3 +304,20 @@ async def test_an_order_to_stop_is_remembered_until_the_next_start(one: Mission)
     assert list(listed.stopped) == ["w"]
     await one.start("watcher", "w")
     assert (await one.bus.ask(PLACER, ListPlacements(), Placements, within_s=1.0)).stopped == {}
+
+
+@on("a")
+async def test_an_order_has_one_id_until_it_is_stopped(one: Mission) -> None:
+    """By it a restarted behavior knows that its memory is of the same order."""
+
+    def order_id() -> str:
+        return one.creators["a"].lives["w"][0].order_id
+
+    await one.start("watcher", "w")
+    first = order_id()
+    await one.creators["a"].kill_child("w")
+    await one.clock.sleep_s(3.0)
+    assert order_id() == first
+    await one.stop("w")
+    await one.start("watcher", "w")
+    assert order_id() not in (first, "")
