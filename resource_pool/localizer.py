@@ -25,6 +25,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, NoResponder, Refusal
+from backbone.kept_file import KeptFile
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import AskRc, Connect, Disconnect
@@ -33,7 +34,6 @@ from resource_pool.begin_places import read_begins
 from resource_pool.commands import Halt
 from resource_pool.dead_reckoning import STILL, Belief, FloorPose
 from resource_pool.floor_plans import board, plan_of, sighted_from
-from resource_pool.kept_file import KeptFile
 from resource_pool.localization import AskFloorPlan, AskHome, AskPose, FloorPlan, LandmarkSighting, Pose, UnknownPlace
 from resource_pool.messages import Applied, Readings
 from resource_pool.motion_track import Known, MotionTrack

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import msgspec
 
 from backbone.atomic_file import replace_file
-from resource_pool.kept_file import KeptFile
+from backbone.kept_file import KeptFile
 from resource_pool.messages import Applied
 
 log = logging.getLogger(__name__)

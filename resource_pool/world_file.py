@@ -7,7 +7,7 @@ import logging
 import msgspec
 
 from backbone.atomic_file import replace_file
-from resource_pool.kept_file import KeptFile
+from backbone.kept_file import KeptFile
 from scout_model.world import WorldMemory
 
 log = logging.getLogger(__name__)

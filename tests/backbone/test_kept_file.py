@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from resource_pool.kept_file import KeptFile
+from backbone.kept_file import KeptFile
 from resource_pool.motion_file import MotionFile
 from resource_pool.stop_file import StopFile
 from resource_pool.stop_messages import StopState
