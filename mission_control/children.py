@@ -24,6 +24,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import ClassVar
 
+import msgspec
+
 from backbone.spoken import counted, value_text
 from mission_control.messages import BehaviorStatus
 
@@ -76,6 +78,42 @@ class Suspension:
     since_s: float
 
 
+class ChildrenMemory(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The state of the rules from which the parent's next process continues.
+
+    Attributes:
+        names: All children, in the order of the mission file.
+        open: The open children.
+        status: Final status of the finished children.
+        payload: Their last reports.
+        suspensions: Started children that have no grant.
+        verdict: Status with which the parent was about to finish.
+        verdict_payload: The payload of that.
+        stopping: Children whose end was ordered and not confirmed yet.
+        ends: Number of the decided ends of the child; see ``composites.Again``.
+        starts_at_s: Mission time of its next start.
+        why_again: Why it starts again.
+        skipped: Child → begin of the suspension for which it is not counted; see ``in_parallel``.
+        sum_s: Sum of a stopwatch; see ``timed.Stopwatch``.
+        since_s: Mission time since which it runs.
+    """
+
+    names: list[str] = []
+    open: list[str] = []
+    status: dict[str, BehaviorStatus] = {}
+    payload: dict[str, dict[str, object]] = {}
+    suspensions: dict[str, Suspension] = {}
+    verdict: BehaviorStatus | None = None
+    verdict_payload: dict[str, object] = {}
+    stopping: list[str] = []
+    ends: int = 0
+    starts_at_s: float = -math.inf
+    why_again: str = ""
+    skipped: dict[str, float] = {}
+    sum_s: float = 0.0
+    since_s: float = math.inf
+
+
 class Children:
     """The rules of a parent whose behavior decides on each finished child.
 
@@ -99,6 +137,7 @@ class Children:
         self.payload: dict[str, Mapping[str, object]] = {}
         self.suspensions: dict[str, Suspension] = {}
         self._falls = dict[str, tuple[int, str]]()  # child → ends of its process in this run, and the last one
+        self._verdict: FinishParent | None = None
 
     def decision(self, name: str) -> Decision:
         """Return the decision on a finished child: by default a failure aborts, a success continues."""
@@ -126,6 +165,34 @@ class Children:
         """Return the orders for the children that run first; none for a behavior without children."""
         self._has_begun = True
         return self._settle(now_s)
+
+    def memory(self) -> ChildrenMemory:
+        """Return the state from which ``resume`` continues."""
+        finished = {name: status for name, status in self.status.items() if status.is_final and name not in self._open}
+        memory = ChildrenMemory(
+            names=list(self._names),
+            open=list(self._open),
+            status=finished,
+            payload={name: dict(self.payload.get(name, {})) for name in finished},
+            suspensions=dict(self.suspensions),
+        )
+        if self._verdict is None:
+            return memory
+        verdict, payload = self._verdict.status, dict(self._verdict.payload)
+        return msgspec.structs.replace(memory, verdict=verdict, verdict_payload=payload)
+
+    def resume(self, memory: ChildrenMemory, now_s: float) -> None:
+        """Continue from the state of an earlier process; call it before ``begin``.
+
+        A child that ran then is started again, so the caller adopts it if it still runs. If its end was not decided, it
+        is decided when the child reports it again.
+        """
+        names, self._names = self._names, tuple(memory.names)
+        self._open, self.status, self.payload = list(memory.open), dict(memory.status), dict(memory.payload)
+        self.suspensions = dict(memory.suspensions)
+        if memory.verdict is not None:
+            self._verdict = FinishParent(memory.verdict, memory.verdict_payload)
+        self.rearranged(names, (), now_s)
 
     def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
         """Return the instructions after the children were changed.
@@ -214,6 +281,10 @@ class Children:
         self.suspensions = {}
         return stops
 
+    def is_running(self, name: str) -> bool:
+        """Return whether the child is started, and was not left since."""
+        return name in self._running
+
     @property
     def suspended_because(self) -> str:
         """Why no started child is at work; empty: a child is at work, or none is started."""
@@ -273,7 +344,7 @@ class Children:
         """If there is a verdict, finish. Otherwise stop and start children so that the wanted ones run."""
         if self.has_finished:
             return []
-        verdict = self.verdict(now_s)
+        verdict = self._verdict or self.verdict(now_s)
         if verdict is not None:
             return self._finish(verdict)
         wanted = self.wanted(now_s)
@@ -289,4 +360,5 @@ class Children:
         return [*map(StopChild, stopping), *map(StartChild, starting)]
 
     def _finish(self, finish: FinishParent) -> list[Instruction]:
+        self._verdict = finish
         return [*self.end(), finish]

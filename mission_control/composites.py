@@ -18,7 +18,9 @@ from collections.abc import Collection, Mapping, Sequence
 from enum import StrEnum
 from typing import ClassVar
 
-from mission_control.children import Children, Decision, FinishParent, Instruction
+import msgspec
+
+from mission_control.children import Children, ChildrenMemory, Decision, FinishParent, Instruction
 from mission_control.messages import BehaviorStatus
 
 ENDLESS = -1
@@ -207,6 +209,21 @@ class Again(Composite):
             self._ends, self._why_again = self._ends + 1, self.why_failed(name)
         return has_finished
 
+    def memory(self) -> ChildrenMemory:
+        """Return the state with the decided ends; see ``Children.memory``."""
+        undecided = sum(self.status[name].is_final for name in self._running)
+        return msgspec.structs.replace(
+            super().memory(),
+            ends=self._ends - undecided,
+            starts_at_s=self._starts_at_s,
+            why_again=self._why_again,
+        )
+
+    def resume(self, memory: ChildrenMemory, now_s: float) -> None:
+        """Continue the count and the pause; see ``Children.resume``."""
+        self._ends, self._starts_at_s, self._why_again = memory.ends, memory.starts_at_s, memory.why_again
+        super().resume(memory, now_s)
+
     def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
         """Count from the beginning for a new child; see ``Children.rearranged``."""
         if any(name not in self._names or name in anew for name in names):
@@ -261,110 +278,3 @@ class WithRepeats(Again):
     """Starts its child again while it succeeds: success after ``most`` cycles, failure as soon as the child fails."""
 
     again_after = BehaviorStatus.SUCCESS
-
-
-class Stopwatch:
-    """A timer that can be stopped and started, with a limit."""
-
-    def __init__(self) -> None:
-        self.sum_s = 0.0
-        """The sum at the last change."""
-        self._since_s = math.inf
-
-    def run(self, now_s: float, *, running: bool) -> None:
-        """Start or stop the timer."""
-        self.sum_s += max(0.0, now_s - self._since_s)
-        self._since_s = now_s if running else math.inf
-
-    def reaches_at_s(self, limit_s: float) -> float:
-        """Return the time at which the sum reaches the limit; infinite while the timer is stopped."""
-        return -math.inf if self.sum_s >= limit_s else self._since_s + (limit_s - self.sum_s)
-
-
-class WithTimeout(Composite):
-    """Runs its child for at most ``seconds``: the result is the child's, or failure when the time is over.
-
-    While the child is suspended, the timer stops with ``WhileSuspended.WAIT`` and runs with ``COUNT``.
-    """
-
-    def __init__(
-        self, names: Sequence[str], *, seconds: float, while_suspended: WhileSuspended = WhileSuspended.WAIT
-    ) -> None:
-        super().__init__(names, while_suspended=while_suspended)
-        self.seconds, self._watch = seconds, Stopwatch()
-
-    def begin(self, now_s: float) -> list[Instruction]:
-        """Start the child and the timer."""
-        self._watch.run(now_s, running=True)
-        return super().begin(now_s)
-
-    def suspended(self, name: str, because: str, now_s: float) -> list[Instruction]:
-        """Stop or start the timer; see ``Children.suspended``."""
-        instructions = super().suspended(name, because, now_s)
-        self._run_or_stop(now_s)
-        return instructions
-
-    def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
-        """Start the timer again if the suspended child was removed; see ``Children.rearranged``."""
-        instructions = super().rearranged(names, anew, now_s)
-        self._run_or_stop(now_s)
-        return instructions
-
-    def time_passed(self, now_s: float) -> list[Instruction]:
-        """Stop or start the timer if ``while_suspended`` was changed; see ``Children.time_passed``."""
-        self._run_or_stop(now_s)
-        return super().time_passed(now_s)
-
-    def _run_or_stop(self, now_s: float) -> None:
-        is_counted = not self.suspensions or self.while_suspended is WhileSuspended.COUNT
-        self._watch.run(now_s, running=self._has_begun and is_counted)
-
-    def verdict(self, now_s: float) -> FinishParent | None:
-        """Return failure when the time is over."""
-        is_at_work = any(not self.status[name].is_final for name in self._running)
-        if is_at_work and now_s >= self._watch.reaches_at_s(self.seconds):
-            detail = f"{self._open[0]} was not done within {self.seconds:g} s"
-            return FinishParent(BehaviorStatus.FAILURE, {"child": self._open[0], "detail": detail})
-        return super().verdict(now_s)
-
-    @property
-    def wakes_at_s(self) -> float:
-        """When the time is over."""
-        return math.inf if self.has_finished else self._watch.reaches_at_s(self.seconds)
-
-    def _because(self) -> str:
-        until_s = self.wakes_at_s
-        if until_s < math.inf:
-            return f", until {until_s:.1f} s of mission time"
-        return f", {self.seconds - self._watch.sum_s:.1f} s left"
-
-
-class WithDelay(Composite):
-    """A node without children: success after ``seconds``."""
-
-    def __init__(self, names: Sequence[str], *, seconds: float) -> None:
-        super().__init__(names)
-        self.seconds, self._watch = seconds, Stopwatch()
-
-    def begin(self, now_s: float) -> list[Instruction]:
-        """Start the clock."""
-        self._watch.run(now_s, running=True)
-        return super().begin(now_s)
-
-    def time_passed(self, now_s: float) -> list[Instruction]:
-        """Finish when the time is over."""
-        return self._arrange(now_s)
-
-    def verdict(self, now_s: float) -> FinishParent | None:
-        """Return success when the time is over."""
-        return FinishParent(BehaviorStatus.SUCCESS) if now_s >= self.wakes_at_s else None
-
-    @property
-    def wakes_at_s(self) -> float:
-        """When the time is over."""
-        return math.inf if self.has_finished else self._watch.reaches_at_s(self.seconds)
-
-    @property
-    def sentence(self) -> str:
-        """Text about the end of the wait."""
-        return "" if self.has_finished else f"waits until {self.wakes_at_s:.1f} s of mission time"

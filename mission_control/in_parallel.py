@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from mission_control.children import Decision, FinishParent, Instruction
+import msgspec
+
+from mission_control.children import ChildrenMemory, Decision, FinishParent, Instruction
 from mission_control.composites import ENDLESS, Composite, WhileSuspended
 from mission_control.messages import BehaviorStatus
 
@@ -53,6 +55,15 @@ class InParallel(Composite):
             detail = f"{len(succeeded)} of {in_all} succeeded, {needed} needed" + (f": {reasons}" if reasons else "")
             return FinishParent(BehaviorStatus.FAILURE, {"failed": failed, "detail": detail})
         return None
+
+    def memory(self) -> ChildrenMemory:
+        """Return the state with the skipped children; see ``Children.memory``."""
+        return msgspec.structs.replace(super().memory(), skipped=dict(self._skipped))
+
+    def resume(self, memory: ChildrenMemory, now_s: float) -> None:
+        """Skip the same children; see ``Children.resume``."""
+        self._skipped = dict(memory.skipped)
+        super().resume(memory, now_s)
 
     def time_passed(self, now_s: float) -> list[Instruction]:
         """Skip the children that exhausted the patience; see ``Composite.time_passed``."""

@@ -6,7 +6,7 @@ from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
 from mission_control.behaviors.composed import Composed, Seconds
-from mission_control.composites import WithTimeout
+from mission_control.timed import WithTimeout
 
 
 class TimeoutParameters(BehaviorParameters, frozen=True, kw_only=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mission_control.behavior import BehaviorParameters
 from mission_control.behaviors.composed import Composed, Seconds
-from mission_control.composites import WithDelay
+from mission_control.timed import WithDelay
 
 
 class WaitParameters(BehaviorParameters, frozen=True, kw_only=True):

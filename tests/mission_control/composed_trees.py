@@ -11,20 +11,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import msgspec
 from hypothesis import strategies as st
 
-from mission_control.children import Children, Decision, FinishParent, Instruction, StartChild, StopChild
-from mission_control.composites import (
-    InFallback,
-    InSequence,
-    WhileSuspended,
-    WithDelay,
-    WithRepeats,
-    WithRetries,
-    WithTimeout,
+from mission_control.children import (
+    Children,
+    ChildrenMemory,
+    Decision,
+    FinishParent,
+    Instruction,
+    StartChild,
+    StopChild,
 )
+from mission_control.composites import InFallback, InSequence, WhileSuspended, WithRepeats, WithRetries
 from mission_control.in_parallel import InParallel
 from mission_control.messages import BehaviorStatus
+from mission_control.timed import WithDelay, WithTimeout
 
 LONGEST = 120  # ticks of one run
 RUNNING, SUCCESS, FAILURE = BehaviorStatus.RUNNING, BehaviorStatus.SUCCESS, BehaviorStatus.FAILURE
@@ -122,14 +124,24 @@ def impatient_trees(draw: st.DrawFn, kind: str, how: WhileSuspended = WhileSuspe
 class ByEvents:
     """Runs a tree through the rules, and checks on the way that nothing starts twice or after the end."""
 
-    def __init__(self, plan: Plan, changes: Mapping[int, tuple[Plan, ...]] | None = None) -> None:
-        """Args: changes: At the begin of a tick → the children of the root from then on."""
+    def __init__(
+        self,
+        plan: Plan,
+        changes: Mapping[int, tuple[Plan, ...]] | None = None,
+        kills: Mapping[int, frozenset[str]] | None = None,
+    ) -> None:
+        """Create a run.
+
+        Args:
+            changes: At the begin of a tick → the children of the root from then on.
+            kills: At the end of a tick → the nodes whose process ends; the next one continues from their memory.
+        """
         self.now = 0
         self.runs = Counter[str]()
         self.began: dict[str, int] = {}
         self.result: Result = None
         self.kids: dict[str, _Node] = {}
-        self._changes = changes or {}
+        self._changes, self._kills = changes or {}, kills or {}
         self._root = self.make(plan)
 
     def run(self) -> Result:
@@ -141,6 +153,8 @@ class ByEvents:
                 self._root.rearrange(self._changes[self.now])
             if self.result is None:
                 self._root.visit()
+            if self.result is None:
+                self._root.kill(self._kills.get(self.now, frozenset()))
         return self.result
 
     def make(self, plan: Plan, parent: _Inner | None = None) -> _Node:
@@ -157,6 +171,7 @@ class _Node:
     def begin(self) -> None: ...
     def visit(self) -> None: ...
     def stop(self) -> None: ...
+    def kill(self, names: frozenset[str]) -> None: ...
 
     def report(self, status: BehaviorStatus) -> None:
         assert not self.is_over, f"{self.plan.name} finished twice"
@@ -197,6 +212,7 @@ class _Inner(_Node):
         self.plans = {child.name: child for child in plan.children}
         self.kids: dict[str, _Node] = {}
         self.orders: deque[Instruction] = deque()
+        self.adopts = set[str]()
         self.is_working = False
 
     def begin(self) -> None:
@@ -217,6 +233,18 @@ class _Inner(_Node):
         self.plans = {child.name: child for child in children}
         self.carry_out(self.rules.rearranged(list(self.plans), anew, self.world.now))
         self.settle()
+
+    def kill(self, names: frozenset[str]) -> None:
+        for kid in self.kids.values():
+            kid.kill(names)
+        if self.plan.name in names:
+            memory = msgspec.msgpack.decode(msgspec.msgpack.encode(self.rules.memory()), type=ChildrenMemory)
+            self.rules = RULES[self.plan.kind](list(self.plans), **self.plan.settings)
+            self.rules.resume(memory, self.world.now)
+            self.adopts = set(self.kids)
+            self.carry_out(self.rules.begin(self.world.now))
+            assert not self.adopts, f"{self.plan.name} left {self.adopts} alone"
+            self.settle()
 
     def settle(self) -> None:
         self.report_suspended(bool(self.rules.suspended_because))
@@ -244,6 +272,9 @@ class _Inner(_Node):
 
     def obey(self, instruction: Instruction) -> None:
         match instruction:
+            case StartChild(name) if name in self.adopts:
+                self.adopts.remove(name)
+                self.heard_suspended(name, self.kids[name].reported_suspended)
             case StartChild(name):
                 assert not self.is_over, f"{self.plan.name} starts {name} after its end"
                 assert name not in self.kids, f"{self.plan.name} starts {name} twice"

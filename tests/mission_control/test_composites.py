@@ -14,17 +14,10 @@ from hypothesis import strategies as st
 from ticked_trees import by_ticks
 
 from mission_control.children import Children, FinishParent, Instruction, StartChild, StopChild
-from mission_control.composites import (
-    InFallback,
-    InSequence,
-    WhileSuspended,
-    WithDelay,
-    WithRepeats,
-    WithRetries,
-    WithTimeout,
-)
+from mission_control.composites import InFallback, InSequence, WhileSuspended, WithRepeats, WithRetries
 from mission_control.in_parallel import InParallel
 from mission_control.messages import BehaviorStatus
+from mission_control.timed import WithDelay, WithTimeout
 
 
 @settings(suppress_health_check=[HealthCheck.too_slow])
