@@ -33,7 +33,8 @@ from backbone.reading_anew import WrongClass
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_exchange import BehaviorExchanges
 from mission_control.behavior_hooks import BehaviorHooks
-from mission_control.behavior_tree import draw
+from mission_control.behavior_memory import BehaviorMemory
+from mission_control.behavior_tree import state_of
 from mission_control.child_keeper import end_by_placer
 from mission_control.children import Children, Decision
 from mission_control.children_loop import ChildrenLoop
@@ -42,7 +43,6 @@ from mission_control.gated_bus import GatedBus, without_exit
 from mission_control.keeper_reports import KeeperReports
 from mission_control.messages import (
     AskBehavior,
-    BehaviorState,
     BehaviorStatus,
     BreakOff,
     BrokenOff,
@@ -127,6 +127,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.child_nodes = {node.name: node for node in self.parameters.children}
         """Name of a child → its node of the tree."""
         self._children = ChildrenLoop(self, self.rules(list(self.child_nodes)))
+        self._memory = BehaviorMemory(self, self, self._children, launch)
         self.has_begun = False
         self.tree_version, self._left = 0, set[str]()
         self.own_reports = OwnReports(self)
@@ -192,19 +193,22 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             raise TypeError(f"finish({status!r}): write BehaviorStatus.SUCCESS or BehaviorStatus.FAILURE")
         if self.status.is_final or not status.is_final or not self.exchanges.may_finish(self, status, payload or {}):
             return
-        self.status, self.payload = status, dict(payload or {})
-        failed = status is BehaviorStatus.FAILURE
-        if failed and not self.own_reports.has_reader and not self._children.absences(has_finished=True):
-            self._children.give_up(self.name, self.payload)
+        self.status, self.payload, failed = status, dict(payload or {}), status is BehaviorStatus.FAILURE
+        self.keep_memory()
         self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self.report(f"finished: {status}" + (f"; last: {self.feedback}" if self.feedback else ""))
         self.begin_task(self._wind_up(), "wind-up")
 
     def tell_parent(self, payload: Mapping[str, object]) -> None:
-        """Send a report of progress to the parent; while the parent cannot be reached, only the newest is kept."""
+        """Send a report of progress to the parent, and keep the memory; only the newest report is sent for certain."""
         if not self.status.is_final:
             self.payload = dict(payload)
             self.own_reports.send()
+            self.keep_memory()
+
+    def keep_memory(self) -> None:
+        """Keep ``memory`` and the state of the children for the behavior's next process, if this one is killed."""
+        self._memory.keep()
 
     @property
     def is_ordered(self) -> bool:
@@ -276,6 +280,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if keeper is not None:
             self.begin_task(self._end_with_keeper(keeper), "keeper")
             await keeper.wait_noted()
+        if self._memory.recall().is_final:
+            self.begin_task(self._wind_up(), "wind-up")
+            return
         await self.start()
         need, other = self.need(), None if self.gate.is_open else self._in_charge.own_arc
         if other is not None:
@@ -295,7 +302,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 self._children.reported(child, report.status, report.payload, report.suspended_because)
                 return ReportNoted()
             case AskBehavior():
-                return self.behavior_state()
+                return state_of(self, self._children.rules, is_last=self.parameters.is_last)
             case TakeBranch() as taken:
                 return await self._take(taken)
             case ListViews():
@@ -333,16 +340,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Return counts of grants and pictures."""
         return self.own_arc.statistics()
 
-    def behavior_state(self) -> BehaviorState:
-        """Return its progress."""
-        children = tuple(self.parameters.children)
-        node = BehaviorNode(self.launch.type, self.name, self.path[-1][1], children=children)
-        rules = self._children.rules
-        label = "last branch; " if self.parameters.is_last else ""
-        about_it = f"{label}{self.status}; {rules.sentence}" if rules.sentence else f"{label}{self.status}"
-        tree = draw([node], rules.remarks() | {self.name: about_it}, in_file_order=rules.in_file_order)
-        return BehaviorState(self.name, self.status, self.payload, dict(self.rcs), self.suspended_because, tree)
-
     async def _take(self, taken: TakeBranch) -> BranchTaken:
         """Apply the changed branch of the tree; a repeated message waits for the same children to end."""
         if taken.version >= self.tree_version:
@@ -364,6 +361,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Report the result of the children's rules after an event; see ``BehaviorOfParts``."""
         self.children_arranged()
         self.suspension_changed()
+        self.keep_memory()
 
     async def _wind_up(self) -> None:
         """Release the ARC, end the children, and repeat the report until the parent acknowledges it.
@@ -371,6 +369,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         A behavior that a console ordered keeps its ARC, so that no ARC of lower priority gets the robot before the
         operator.
         """
+        if self.status is BehaviorStatus.FAILURE and not (self.own_reports.has_reader or self._children.given_up):
+            self._children.give_up(self.name, self.payload)
         await self.own_arc.acting.stop()
         if self.own_reports.keeper is not None:
             await self.own_arc.rest()

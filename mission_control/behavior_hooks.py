@@ -6,7 +6,9 @@ Each hook documents when it is called, its purpose, and what it must not do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import msgspec
 
 from backbone.mission.behavior_nodes import ArcNeed
 from backbone.mission.class_facts import ANY_ARC
@@ -23,6 +25,8 @@ class BehaviorHooks:
     """Kind of ARC like which the behavior needs one. A class that overrides ``see`` and sets no kind needs pictures;
     one that overrides ``act``, an ARC of any kind. Classes derived from one that sets ``""`` need none either."""
     _needs_none: ClassVar[bool] = False
+    memory_type: ClassVar[type[msgspec.Struct] | None] = None
+    """Class of the values that ``memory`` returns; None: a behavior that is killed begins anew."""
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
@@ -125,6 +129,24 @@ class BehaviorHooks:
 
         When: for the newest picture of the present grant; older pictures are skipped.
         What: detect, publish, ``report``. Not: take longer than a picture's period, because it blocks the event loop.
+        """
+
+    def memory(self) -> msgspec.Struct | None:
+        """Return the progress that the next process needs, if this one is killed.
+
+        When: with each ``tell_parent`` and ``keep_memory``, and at the end of each grant, for classes that set
+        ``memory_type``. What: few values that mean the same after a restart, such as counts. Not: what the robot does
+        now; the next process gets it after an interruption.
+        """
+        return None
+
+    def recall(self, memory: Any) -> None:
+        """Continue from the progress of the last process.
+
+        When: before ``start``, if the last process kept a memory under the same order, with the same parameters.
+
+        Args:
+            memory: A ``memory_type``, as ``memory`` returned it.
         """
 
     def rules(self, children: Sequence[str]) -> Children:

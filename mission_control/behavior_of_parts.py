@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Coroutine, Mapping, Sequence
 from typing import Protocol
 
+import msgspec
+
 from backbone.component.component_of_parts import ComponentOfParts
 from backbone.mission.behavior_nodes import BehaviorNode, PathStep
 from mission_control.children import Decision
@@ -26,6 +28,14 @@ class BehaviorOfParts(ComponentOfParts, Protocol):
     @property
     def path(self) -> Sequence[PathStep]:
         """Present names and priorities from the mission's root to the behavior."""
+
+    @property
+    def parameters(self) -> msgspec.Struct:
+        """Its parameters, from the tree and its own."""
+
+    @property
+    def rcs(self) -> Mapping[str, str]:
+        """Role → name of the granted RCs."""
 
     @property
     def is_ordered(self) -> bool:
@@ -49,6 +59,9 @@ class BehaviorOfParts(ComponentOfParts, Protocol):
 
     async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         """Conclude after the end of all children."""
+
+    def keep_memory(self) -> None:
+        """Keep its state for the next process."""
 
     def rules_applied(self) -> None:
         """Called after the rules have handled an event."""

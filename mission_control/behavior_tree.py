@@ -5,6 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from backbone.mission.behavior_nodes import BehaviorNode
+from mission_control.behavior_of_parts import BehaviorOfParts
+from mission_control.children import Children
+from mission_control.messages import BehaviorState
+
+
+def state_of(behavior: BehaviorOfParts, rules: Children, *, is_last: bool) -> BehaviorState:
+    """Return a behavior's progress, with its branch of the tree as its rules see it."""
+    children, (name, priority) = tuple(behavior.child_nodes.values()), behavior.path[-1]
+    node = BehaviorNode(behavior.launch.type, name, priority, children=children)
+    status = f"last branch; {behavior.status}" if is_last else str(behavior.status)
+    about_it = f"{status}; {rules.sentence}" if rules.sentence else status
+    tree = draw([node], rules.remarks() | {name: about_it}, in_file_order=rules.in_file_order)
+    return BehaviorState(name, behavior.status, behavior.payload, dict(behavior.rcs), behavior.suspended_because, tree)
 
 
 def draw(

@@ -13,10 +13,20 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
+import msgspec
+
 from backbone.component.messages import Absence
 from mission_control.behavior_of_parts import BehaviorOfParts
 from mission_control.child_keeper import ChildKeeper
-from mission_control.children import Children, Decision, FinishParent, Instruction, StartChild, StopChild
+from mission_control.children import (
+    Children,
+    ChildrenMemory,
+    Decision,
+    FinishParent,
+    Instruction,
+    StartChild,
+    StopChild,
+)
 from mission_control.messages import BehaviorStatus
 
 
@@ -37,20 +47,34 @@ class ChildrenLoop:
         """The state of the children."""
         self._parent, self._clock, self._nodes = parent, parent.clock, parent.child_nodes
         self._keeper = ChildKeeper(parent, self.reported, self._child_fell, self._child_left)
-        self._given_up: dict[str, Absence] = {}
+        self.given_up: dict[str, Absence] = {}
+        """Name of a behavior that could not work → the absence that is reported."""
         self._last_orders: dict[str, asyncio.Event] = {}
+        self._has_begun = False
+        self._stopping = list[str]()  # as often as stops of a child are not confirmed
+        self._left_off: Sequence[str] = ()  # children whose stop an earlier process may not have carried out
         self._waking: asyncio.Task[None] | None = None
         self._wakes_at_s, self._woke_at_s = math.inf, -math.inf
         self._latest_s = -math.inf
 
     def begin(self) -> None:
         """Start the children that run first; end children of an earlier process that are not wanted."""
-        self._carry_out(self.rules.begin(self._now_s()))
+        self._has_begun = True
+        left_off = [StopChild(name) for name in self._left_off]
+        self._carry_out([*left_off, *self.rules.begin(self._now_s())])
         if self._nodes:
             self._parent.begin_task(
-                self._keeper.stop_those_of_an_earlier_life(lambda name: name in self.rules.status),
-                "children of an earlier life",
+                self._keeper.stop_those_of_an_earlier_life(self.rules.is_running), "children of an earlier life"
             )
+
+    def memory(self) -> ChildrenMemory:
+        """Return the state from which ``resume`` continues."""
+        return msgspec.structs.replace(self.rules.memory(), stopping=list(self._stopping))
+
+    def resume(self, memory: ChildrenMemory) -> None:
+        """Continue from the state of an earlier process; call it before ``begin``."""
+        self._left_off = tuple(memory.stopping)
+        self.rules.resume(memory, self._now_s())
 
     def reported(
         self, name: str, status: BehaviorStatus, payload: Mapping[str, object], suspended_because: str = ""
@@ -74,7 +98,7 @@ class ChildrenLoop:
             anew: Names of nodes that end and begin again.
         """
         for name in (*gone, *anew):
-            if self._given_up.pop(name, None) is not None:
+            if self.given_up.pop(name, None) is not None:
                 self._parent.changed()
         self._carry_out(self.rules.rearranged(list(self._nodes), anew, self._now_s()))
         for name in gone:
@@ -82,14 +106,16 @@ class ChildrenLoop:
                 await self._last_orders[name].wait()
 
     async def end(self) -> None:
-        """End all started children and wait for that; start no other child."""
+        """End all started children, also those of an earlier process, and wait for that; start no other child."""
         stops = [each.name for each in self.rules.end() if isinstance(each, StopChild)]
         self._arm()
         await asyncio.gather(*map(self._keeper.stop, stops))
+        if not self._has_begun and self._nodes:
+            await self._keeper.stop_those_of_an_earlier_life(self.rules.is_running)
 
     def absences(self, *, has_finished: bool) -> list[Absence]:
         """Return the children that are given up and, until the behavior has finished, those that are missing."""
-        return [*([] if has_finished else self._keeper.absences()), *self._given_up.values()]
+        return [*([] if has_finished else self._keeper.absences()), *self.given_up.values()]
 
     def give_up(self, name: str, payload: Mapping[str, object]) -> None:
         """Report a behavior that could not work as a lasting absence; a behavior that ran and failed is not absent."""
@@ -98,7 +124,7 @@ class ChildrenLoop:
                 f"see 'scout-backbone story {name}', mend the cause, then stop {self._parent.name} and start it again"
             )
             cause = str(payload.get("detail", "it failed"))
-            self._given_up[name] = Absence(name, self._clock.now_s(), cause, remedy=remedy)
+            self.given_up[name] = Absence(name, self._clock.now_s(), cause, remedy=remedy)
             self._parent.changed()
 
     def _child_fell(self, name: str, how: str) -> None:
@@ -124,6 +150,8 @@ class ChildrenLoop:
     def _order(self, instruction: Instruction) -> ChildOrder:
         if isinstance(instruction, FinishParent):
             return ChildOrder(instruction, list(self._last_orders.values()))
+        if isinstance(instruction, StopChild):
+            self._stopping.append(instruction.name)
         before = self._last_orders.get(instruction.name)
         order = ChildOrder(instruction, [] if before is None else [before])
         self._last_orders[instruction.name] = order.is_done
@@ -139,11 +167,13 @@ class ChildrenLoop:
     async def _obey(self, instruction: Instruction) -> None:
         match instruction:
             case StartChild(name):
-                self._given_up.pop(name, None)
+                self.given_up.pop(name, None)
                 if not self.rules.has_finished:
                     await self._keeper.start(name)
             case StopChild(name):
                 await self._keeper.stop(name)
+                self._stopping.remove(name)
+                self._parent.keep_memory()
             case FinishParent(status, payload):
                 await self._parent.children_finished(status, payload)
             case _:

@@ -239,6 +239,7 @@ class OwnArc:
         owner.suspension_changed()
         await self.acting.stop()
         await self._hooks.suspended(notice.reason, notice.by)
+        owner.keep_memory()
 
     async def rest(self) -> None:
         """Bring the robot to rest, if the owner commands one; the grant continues."""

@@ -171,6 +171,8 @@ class FakePlacer:
         self.stopped: set[str] = set()
         self.stop_takes_s: dict[str, float] = {}
         self.on_arc: Callable[[FakeArc], None] = lambda arc: None
+        self.run_directory = ""
+        self._order_ids: dict[str, str] = {}
         self._lives: dict[str, asyncio.Task[None]] = {}
         self.bus = network.join(PLACER, clock)
         self.creator = network.join("backbone/creator-local", clock)
@@ -199,6 +201,10 @@ class FakePlacer:
             raise NameTaken(f"{order.name} runs")
         if order.type in self.refusals:
             raise self.refusals[order.type]
+        self._order_ids[order.name] = f"1.{len(self.started)}"
+        return await self._launch(order, requester)
+
+    async def _launch(self, order: Start, requester: str) -> Any:
         self.started.append(order.name)
         self.placed[order.name], self.requesters[order.name] = order, requester
         self.stopped.discard(order.name)
@@ -213,7 +219,7 @@ class FakePlacer:
 
     async def restart(self, name: str) -> Any:
         """What a creator does after a death: the same order again."""
-        return await self.launch(self.placed[name], self.requesters[name])
+        return await self._launch(self.placed[name], self.requesters[name])
 
     async def kill(self, name: str) -> None:
         """End it as a SIGKILL does: nothing is drained, its token falls."""
@@ -252,6 +258,8 @@ class FakePlacer:
             1.0,
             order.parameters,
             requester,
+            run_directory=self.run_directory,
+            order_id=self._order_ids[order.name],
         )
         bus = self.network.join(launch.address, self.clock)
         component = self.classes[order.type](launch, bus, self.clock)

@@ -67,11 +67,18 @@ def _value(text: str) -> object:
     return value if isinstance(value, float | int) else text
 
 
+class GiveMemory(msgspec.Struct, frozen=True):
+    """Time for which the command was in force."""
+
+    held_s: float
+
+
 class Give(Driver[GiveParameters]):
     """Succeeds when the command was applied and its time is over; fails if the ARC has no such command."""
 
     parameters_type = GiveParameters
     hands_over = frozenset({"held_s"})
+    memory_type = GiveMemory
     never = Driver.never | {WrongCommand.code}
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
@@ -88,6 +95,14 @@ class Give(Driver[GiveParameters]):
     @held_s.setter
     def held_s(self, held_s: float) -> None:
         self._held_s = held_s
+
+    def memory(self) -> GiveMemory:
+        """Return the time until now; see ``BehaviorHooks.memory``."""
+        return GiveMemory(self.held_s)
+
+    def recall(self, memory: GiveMemory) -> None:
+        """Hold the ARC for the rest of the time."""
+        self.held_s = memory.held_s
 
     def parameters_changed(self) -> None:
         """Send the new command now, or at the next grant."""

@@ -10,7 +10,7 @@ import asyncio
 from typing import Annotated
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -40,11 +40,18 @@ class HideParameters(BehaviorParameters, frozen=True, kw_only=True):
     looks: Times = 20
 
 
+class HideMemory(Struct, frozen=True):
+    """Progress of a search: the number of looks around."""
+
+    looks: int
+
+
 class Hide(Driver[HideParameters]):
     """Succeeds in a dark place; fails if it finds no dark place."""
 
     parameters_type = HideParameters
     hands_over = frozenset({"search"})
+    memory_type = HideMemory
     needs_arc = "capture"
     never = Driver.never | {UnusablePicture.code}
 
@@ -75,6 +82,7 @@ class Hide(Driver[HideParameters]):
         """Carry out the decision of each picture; see ``Driver.drive_on``."""
         while not (self.search.is_final and await self.halted(self.parameters)):
             self.report(f"{robot} {self.search.stage}, {self._seen()}")
+            self.keep_memory()
             await self._fresh.wait()
             self._fresh.clear()
             if self._unusable is not None:
@@ -92,6 +100,14 @@ class Hide(Driver[HideParameters]):
     async def suspended(self, reason: str, by: str) -> None:
         """Report the looks around; see ``Behavior.suspended``."""
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
+
+    def memory(self) -> HideMemory:
+        """Return the looks around; see ``BehaviorHooks.memory``."""
+        return HideMemory(self.search.looks)
+
+    def recall(self, memory: HideMemory) -> None:
+        """Begin the next look around."""
+        self.search.looks = memory.looks
 
     def parameters_changed(self) -> None:
         """Begin again with the new parameters."""

@@ -86,7 +86,8 @@ class JumpCourse:
         """The stage of the jump."""
         self.jumps = 0
         """Number of jumps that the robot obeyed."""
-        self._jumped_s = -math.inf
+        self.jumped_s = -math.inf
+        """Time of the last jump; its landing is ``LANDED_AFTER_S`` later."""
         self._is_seen_landing = False
         self._pursuit = Pursuit(speed_m_s)
 
@@ -97,11 +98,11 @@ class JumpCourse:
 
     def airborne_s(self, now_s: float) -> float:
         """Return the time for which the robot must still get no command, 0: none."""
-        return max(0.0, self._jumped_s + LANDED_AFTER_S - now_s)
+        return max(0.0, self.jumped_s + LANDED_AFTER_S - now_s)
 
     def lands_in(self, airborne_s: float, now_s: float) -> None:
         """Give no command for this time, because the robot still jumps."""
-        self._jumped_s = now_s + airborne_s - LANDED_AFTER_S
+        self.jumped_s = now_s + airborne_s - LANDED_AFTER_S
 
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision depends only on its position then."""
@@ -109,6 +110,12 @@ class JumpCourse:
         self._pursuit.interrupt()
         if self.stage is not JumpStage.AIRBORNE and not self.is_final:
             self.stage = JumpStage.RUN_UP
+
+    def resume(self, jumps: int, jumped_s: float) -> None:
+        """Continue after these jumps of an earlier course."""
+        self.jumps, self.jumped_s = jumps, jumped_s
+        if jumped_s > -math.inf:
+            self._enter(JumpStage.AIRBORNE)
 
     def jumped(self) -> None:
         """Record that the robot obeyed the last ``Act.JUMP``."""
@@ -118,7 +125,7 @@ class JumpCourse:
         """Record a jump of the robot that this course has not decided."""
         if not self.is_final:
             self._enter(JumpStage.AIRBORNE)
-        self._jumped_s, self._is_seen_landing = now_s, False
+        self.jumped_s, self._is_seen_landing = now_s, False
         self.jumped()
 
     def decide(self, position: Position, now_s: float) -> Motion | Act:
@@ -163,7 +170,7 @@ class JumpCourse:
                     self._enter(JumpStage.RUN_UP)
                 elif abs(turned(obstacle.heading_rad - position.heading_rad)) < AIMED_RAD:
                     self._enter(JumpStage.AIRBORNE)
-                    self._jumped_s, self._is_seen_landing = now_s, True
+                    self.jumped_s, self._is_seen_landing = now_s, True
                     return Act.JUMP
                 return turn_to(position, obstacle.heading_rad)
 

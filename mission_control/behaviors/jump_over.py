@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -54,11 +54,24 @@ class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
             raise ValueError(f"front is {self.front!r}: write one place, x,y in meters")
 
 
+class JumpMemory(Struct, frozen=True):
+    """Jumps of a robot.
+
+    Attributes:
+        number: Number of jumps that the robot obeyed.
+        last_s: Mission time of the last one that was decided.
+    """
+
+    number: int
+    last_s: float
+
+
 class JumpOver(Driver[JumpOverParameters]):
     """Succeeds when the robot has driven on beyond the obstacle; fails after ``attempts`` unsuccessful jumps."""
 
     parameters_type = JumpOverParameters
     hands_over = frozenset({"course"})
+    memory_type = JumpMemory
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -74,8 +87,10 @@ class JumpOver(Driver[JumpOverParameters]):
                 case Motion() as motion:
                     await self.move(motion)
                 case Act.JUMP:
+                    self.keep_memory()  # the next process waits for the landing
                     await self.held.jump()
                     course.jumped()  # the robot may get another course meanwhile
+                    self.keep_memory()
                     self.story.note(robot, f"jumps, number {course.jumps}")
                 case Act.WAIT:
                     pass
@@ -101,6 +116,14 @@ class JumpOver(Driver[JumpOverParameters]):
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the state; after the suspension the next decision depends only on the robot's position."""
         self.report(f"suspended: {suspended_because(reason, by)}; {self.course.jumps} jumps until now")
+
+    def memory(self) -> JumpMemory:
+        """Return the jumps; see ``BehaviorHooks.memory``."""
+        return JumpMemory(self.course.jumps, self.course.jumped_s)
+
+    def recall(self, memory: JumpMemory) -> None:
+        """Wait for the landing of the last jump, and judge it."""
+        self.course.resume(memory.number, memory.last_s)
 
     def parameters_changed(self) -> None:
         """Begin again with the new parameters, after a present jump."""

@@ -8,6 +8,8 @@ In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name; a 
 
 from __future__ import annotations
 
+import msgspec
+
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
@@ -43,11 +45,18 @@ class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
         read_places(self.waypoints)
 
 
+class PatrolMemory(msgspec.Struct, frozen=True):
+    """Progress of a patrol."""
+
+    reached: int
+
+
 class Patrol(Driver[PatrolParameters]):
     """Publishes ``WaypointReached`` once for each way point, in order, despite any number of suspensions."""
 
     parameters_type = PatrolParameters
     hands_over = frozenset({"route", "_published"})
+    memory_type = PatrolMemory
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -73,6 +82,14 @@ class Patrol(Driver[PatrolParameters]):
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the state; after the suspension continue from the robot's position at that time."""
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
+
+    def memory(self) -> PatrolMemory:
+        """Return the number of published way points; see ``BehaviorHooks.memory``."""
+        return PatrolMemory(self._published)
+
+    def recall(self, memory: PatrolMemory) -> None:
+        """Continue to the way point after these."""
+        self.route.reached = self._published = memory.reached
 
     def parameters_changed(self) -> None:
         """Begin a new patrol with the new parameters; arrivals of the old one stay published."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -48,11 +48,18 @@ class PickupParameters(ServoParameters, frozen=True, kw_only=True):
             raise ValueError(f"near is {self.near!r}: write one place, x,y in meters")
 
 
+class PickupMemory(Struct, frozen=True):
+    """Progress of a return: the number of unsuccessful searches."""
+
+    in_vain: int
+
+
 class ReturnToPickup(Servo[PickupParameters]):
     """Succeeds at its place before the mark, from any start; fails if it does not find the mark."""
 
     parameters_type = PickupParameters
     hands_over = Servo.hands_over | {"route"}
+    memory_type = PickupMemory
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -80,6 +87,14 @@ class ReturnToPickup(Servo[PickupParameters]):
         """Keep the state of the search; see ``Driver.interrupted``."""
         self.route.interrupt()
         super().interrupted()
+
+    def memory(self) -> PickupMemory:
+        """Return the unsuccessful searches; see ``BehaviorHooks.memory``."""
+        return PickupMemory(self.route.in_vain)
+
+    def recall(self, memory: PickupMemory) -> None:
+        """Count on."""
+        self.route.in_vain = memory.in_vain
 
     def parameters_changed(self) -> None:
         """Begin again with the new parameters; by sight if the mark is in sight."""
@@ -120,6 +135,7 @@ class ReturnToPickup(Servo[PickupParameters]):
         step = await self.next_step()
         if self.has_searched(self.parameters.search_turns):
             self.route.not_found()
+            self.keep_memory()
             self.search_anew()
             return False
         given = self.parameters
