@@ -276,7 +276,7 @@ class Localizer(ResourceController[LocalizerParameters]):
                 self._published[name] = pose
                 self.bus.publish(self.address, Conversation.POSES, pose)
                 self._poses += 1
-        self._keep(now_s)
+        self._keep()
 
     async def _begin(self, name: str) -> None:
         """Continue from the saved knowledge, or begin at the start place of a robot that no command has moved yet."""
@@ -295,8 +295,8 @@ class Localizer(ResourceController[LocalizerParameters]):
         if told is not None:
             self._robots[name].recover(told)
 
-    def _keep(self, now_s: float) -> None:
-        robots = {name: robot.known(now_s) for name, robot in self._robots.items()}
+    def _keep(self) -> None:
+        robots = {name: robot.known for name, robot in self._robots.items()}
         try:
             if (target := self._file.target()) is not None:
                 replace_file(target, msgspec.msgpack.encode(robots), is_lasting=False)

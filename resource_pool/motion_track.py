@@ -56,6 +56,7 @@ class MotionTrack:
     """
 
     def __init__(self, known: Known) -> None:
+        self._known = known
         self._reckoning = DeadReckoning(known.belief, known.motion)
         self._number, self._last_s = known.number, known.last_s
         self._left_s = math.inf
@@ -82,9 +83,13 @@ class MotionTrack:
         """Return the belief for this time; see ``DeadReckoning.believe``."""
         return self._reckoning.believe(now_s)
 
-    def known(self, now_s: float) -> Known:
-        """Return what to save at this time."""
-        return Known(self.believe(now_s), self._reckoning.motion, self._number, self._last_s)
+    @property
+    def known(self) -> Known:
+        """What to save.
+
+        It is as of the last event, because motions after it may be on the way: to a host that is cut off, or lost.
+        """
+        return self._known
 
     def moved(self, told: Applied) -> None:
         """Take a motion; if motions before it were lost, it waits for ``recover`` or ``give_up``.
@@ -104,6 +109,7 @@ class MotionTrack:
         """Take a count or a sighting."""
         event(self._reckoning)
         self._since.append((at_s, event))
+        self._note()
 
     def rc_left(self, now_s: float) -> None:
         """Record that the RC's process left now, and that all of its motions were heard until then."""
@@ -161,6 +167,7 @@ class MotionTrack:
             self._reckoning.believe(at_s)
             self._reckoning.loses(UNSEEN_M_S * unseen_s, UNSEEN_RAD_S * unseen_s)
             self._last_s = at_s
+            self._note()
 
     def _take(self, told: Applied) -> None:
         forward_m_s, turn_rad_s = told.values.get("forward_m_s"), told.values.get("turn_rad_s")
@@ -173,3 +180,8 @@ class MotionTrack:
         self._number, self._last_s = told.number, max(self._last_s, told.at_s)
         self._at_last = self._reckoning.copy()
         self._since.clear()
+        self._note()
+
+    def _note(self) -> None:
+        """Note what to save, as of the event that was taken just now."""
+        self._known = Known(self.believe(-math.inf), self._reckoning.motion, self._number, self._last_s)

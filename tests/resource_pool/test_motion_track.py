@@ -106,18 +106,19 @@ def test_motions_that_arrive_late_count_at_their_own_times(
     assert math.cos(one.pose.heading_rad - other.pose.heading_rad) > 1 - 1e-9
 
 
-@given(courses, st.integers(0, 24), st.floats(0, 0.4))
+@given(courses, st.integers(0, 24), st.floats(0, 5))
 def test_a_track_that_ends_anywhere_is_continued_by_the_next(
     course: list[tuple[float, Happening, bool]], ends_after: int, later_s: float
 ) -> None:
+    """It may end long after the last motion that it took: a host that is cut off takes none."""
     whole, former = MotionTrack(BEGIN), MotionTrack(BEGIN)
     played = [one for one in numbered(course) if isinstance(one[1], Applied)]
     for number, (at_s, told, _) in enumerate(played):
         play(whole, at_s, told)
         if number < ends_after:
             play(former, at_s, told)
-    saved_s = min(former.last_s + later_s, min((at_s for at_s, _, _ in played[ends_after:]), default=math.inf))
-    saved = msgspec.msgpack.encode(former.known(saved_s))
+    former.believe(former.last_s + later_s)
+    saved = msgspec.msgpack.encode(former.known)
     nxt = MotionTrack(msgspec.msgpack.decode(saved, type=Known))
     nxt.recover(motions_of(played, nxt.last_s))
     end_s = BEGIN_S + 30.0
