@@ -6,7 +6,15 @@ make a new one. So a process writes only into the folder that it found when it b
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Mapping
 from pathlib import Path
+
+from backbone.atomic_file import replace_file
+
+log = logging.getLogger(__name__)
+
+FOLDER = "kept"
 
 
 class KeptFile:
@@ -14,7 +22,7 @@ class KeptFile:
 
     Args:
         run_directory: The mission's folder on this host; empty: nothing is kept.
-        kind: Folder in it.
+        kind: Kind of the file, such as ``motions``.
         name: Name of the component.
     """
 
@@ -29,7 +37,7 @@ class KeptFile:
         """Path of the file; None: nothing is kept, or no longer, or the mission has ended."""
         if self._run_directory is None or self._found is None or _identity(self._run_directory) != self._found:
             return None
-        return self._run_directory / self._kind / self._name
+        return self._run_directory / FOLDER / self._kind / self._name
 
     def give_up(self) -> None:
         """Keep nothing from now on."""
@@ -55,8 +63,31 @@ class KeptFile:
         """
         path = self.path
         if path is not None:
-            path.parent.mkdir(mode=0o700, exist_ok=True)
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         return path
+
+
+def kept_files(run_directory: Path) -> dict[Path, bytes]:
+    """Return all kept files of a mission's folder: path in it → content; those that cannot be read are left out."""
+    found = {}
+    for path in sorted((run_directory / FOLDER).rglob("[!.]*")):
+        try:
+            if path.is_file():
+                found[path.relative_to(run_directory)] = path.read_bytes()
+        except OSError as error:
+            log.warning("%s is lost: %s", path, error)
+    return found
+
+
+def put_back(run_directory: Path, files: Mapping[Path, bytes]) -> None:
+    """Write kept files to another folder of the same mission on the same host, before a component runs there."""
+    for path, content in files.items():
+        target = run_directory / path
+        try:
+            target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            replace_file(target, content, is_lasting=False)
+        except OSError as error:
+            log.warning("%s is lost: %s", target, error)
 
 
 def _identity(folder: Path | None) -> tuple[int, int] | None:

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
 
 from backbone import run_files
-from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
+from backbone.addresses import COMPONENT_DATABASE, LAUNCHER, NAMESERVER
 from backbone.authentication import SECRET_NAME, keep_secret
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, NameTaken
+from backbone.component.messages import Absence, AskState, ComponentState, NameTaken
 from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
 from backbone.creator.messages import TYPE, ProcessFell, ProcessState, creator_name
 from backbone.creator.preload import preloaded_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
+from backbone.incarnation import Incarnation
+from backbone.kept_file import kept_files, put_back
 from backbone.launcher.core_launches import CORE_POLICY
 from backbone.launcher.folder_watch import wait_removed
 from backbone.launcher.mission_connection import REPLY_TIME_S
@@ -28,6 +30,19 @@ from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 READY_WITHIN_S = 20.0  # chosen: as for the creators that a launcher starts
 PREDECESSOR_ENDS_S = 5.0  # chosen: a killed offer's creator ends within 3 s; seconds of the machine
 ASK_AGAIN_S = 0.2  # chosen: no person sees the difference
+
+
+@dataclass
+class LeftFiles:
+    """What the components of this machine kept before a cut, for their next processes in the same run of the mission.
+
+    Attributes:
+        run: The launcher of that run; None: none is known.
+        files: See ``kept_files``.
+    """
+
+    run: Incarnation | None = None
+    files: Mapping[Path, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -70,14 +85,17 @@ def recorder_of_host(offered: Offered, clock: Clock) -> MissionRecorder | None:
 class KeptCreator:
     """The creator of this machine, with a zygote and a folder of its own; the mission's secret is in the folder.
 
+    Args:
+        left: Files of an earlier creator of this machine; at the end, those of this one.
+
     Attributes:
         on_fell: Called when the creator has ended unexpectedly.
     """
 
-    def __init__(self, launch: Launch, offered: Offered) -> None:
+    def __init__(self, launch: Launch, offered: Offered, left: LeftFiles) -> None:
         self.on_fell: Callable[[ProcessFell], None] = lambda _fell: None
         self.on_changed: Callable[[], None] = lambda: None
-        self._launch, self._offered = launch, offered
+        self._launch, self._offered, self._left = launch, offered, left
         self._keeper: ProcessKeeper | None = None
 
     async def start(self, bus: Bus, clock: Clock) -> None:
@@ -91,7 +109,11 @@ class KeptCreator:
         await _wait_free(bus, clock, creator_name(self._launch.host))
         answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
         types = [counted.component_type for counted in answered.types]
+        run = (await bus.ask(LAUNCHER, AskState(), ComponentState, within_s=REPLY_TIME_S)).incarnation
         self._directory = directory = prepared_folder(self._offered)
+        if self._left.run == run:
+            put_back(directory, self._left.files)
+        self._left.run = run
         self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))
         self._keeper = ProcessKeeper(self._zygote, clock)
         self._keeper.on_fell = self.on_fell
@@ -116,6 +138,7 @@ class KeptCreator:
         keeper, self._keeper = self._keeper, None
         if keeper is not None:
             await keeper.close()
+            self._left.files = kept_files(self._directory)
             await self._zygote.close()
 
     def _creator_launch(self, types: list[ComponentType], directory: Path) -> Launch:

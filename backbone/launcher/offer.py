@@ -31,7 +31,7 @@ from backbone.component.messages import Absence, AskState, AskTime, ComponentSta
 from backbone.creator.messages import ListProcesses, Processes, ProcessFell, offer_name
 from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.launcher.kept_creator import KeptCreator, Offered, recorder_of_host
+from backbone.launcher.kept_creator import KeptCreator, LeftFiles, Offered, recorder_of_host
 from backbone.launcher.link_speed import LinkSpeed
 from backbone.launcher.mission_connection import REPLY_TIME_S, clock_elsewhere, connected, mission_clock
 from backbone.launcher.mission_recorder import MissionRecorder
@@ -226,6 +226,7 @@ class Offering:
 
     def __init__(self, offered: Offered, say: Callable[[str], None], secret_file: Path | None = None) -> None:
         self._offered, self._say, self._secret_file = offered, say, secret_file
+        self._left = LeftFiles()
         self._current: MachineOffer | None = None
         self._lives: asyncio.Task[None] | None = None
         self._watching: asyncio.Task[None] | None = None
@@ -293,7 +294,7 @@ class Offering:
         try:
             clock = await clock_elsewhere(offered.mission, offered.endpoint, source, offered.secret)
             launch = _launch(offered, name, clock)
-            creator, recorder = KeptCreator(launch, offered), recorder_of_host(offered, clock)
+            creator, recorder = KeptCreator(launch, offered, self._left), recorder_of_host(offered, clock)
             config = client_config(offered.endpoint, offered.secret)
             bus = await ZenohBus.open_when_up(offered.mission, source, clock, config)
         except HubUnreachable as error:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from backbone.kept_file import KeptFile
+from backbone.kept_file import KeptFile, kept_files, put_back
 from resource_pool.motion_file import MotionFile
 from resource_pool.stop_file import StopFile
 from resource_pool.stop_messages import StopState
@@ -39,9 +39,31 @@ def test_a_process_of_a_mission_that_has_ended_writes_nothing(tmp_path: Path, *,
 
 def test_it_is_read_by_the_next_process(tmp_path: Path) -> None:
     target = KeptFile(str(tmp_path), "stops", "one").target()
-    assert target == tmp_path / "stops" / "one"
+    assert target == tmp_path / "kept" / "stops" / "one"
     target.write_bytes(b"x")
     assert KeptFile(str(tmp_path), "stops", "one").read() == b"x"
+
+
+def test_kept_files_move_to_another_folder(tmp_path: Path) -> None:
+    before, after = tmp_path / "before", tmp_path / "after"
+    for folder in (before, after):
+        folder.mkdir()
+    write_all(before)[1].write(StopState("one", True, 1, "anna", "", 3.0))
+    (before / "secret").write_text("not kept")
+    (before / "kept" / "stops" / ".one.new").write_text("half written")
+    put_back(after, kept_files(before))
+    assert write_all(after)[1].read() == StopState("one", True, 1, "anna", "", 3.0)
+    assert [str(path) for path in kept_files(after)] == ["kept/stops/one"]
+    assert not (after / "secret").exists()
+
+
+def test_a_kept_file_that_cannot_be_moved_is_left_with_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "kept").touch()
+    put_back(tmp_path, {Path("kept/stops/one"): b"x"})
+    assert "kept/stops/one is lost" in caplog.text
+    assert kept_files(tmp_path / "nowhere") == {}
 
 
 @pytest.mark.parametrize("folder", ["", "/nowhere/at/all"])

@@ -147,7 +147,7 @@ def test_a_damaged_memory_is_left_with_a_warning(
     async def scene(placer: FakePlacer) -> None:
         walker = await root(placer, node("walker", "walker"))
         walker.step()
-        replace_file(tmp_path / "behaviors" / "walker", b"\x99torn")
+        replace_file(tmp_path / "kept" / "behaviors" / "walker", b"\x99torn")
         walker = await die(placer, "walker")
         assert walker.number == 0
         walker.step()

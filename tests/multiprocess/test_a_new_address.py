@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 
 import pytest
-import three_hosts
 from namespaces import SUBNET, NetworkHost
 from three_hosts import ThreeHosts, mission_on_three_hosts, mission_text
 
@@ -60,11 +59,8 @@ def watch_on(mission: ThreeHosts) -> None:
     mission.wait("it receives pictures", lambda: pictures(mission) > before, 20.0)
 
 
-def test_a_machine_whose_address_changes_has_no_deaf_component(
-    short_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(three_hosts, "mission_text", with_watchers_on_far_and_their_arcs_on_near)
-    with mission_on_three_hosts(short_path) as mission:
+def test_a_machine_whose_address_changes_has_no_deaf_component(short_path: Path) -> None:
+    with mission_on_three_hosts(short_path, text=with_watchers_on_far_and_their_arcs_on_near) as mission:
         there = mission.components()
         assert [there[name].host for name in ("watch-scout1", "watch-scout1-capture")] == ["far", "near"]
         for change in range(CHANGES):

@@ -254,11 +254,16 @@ def mission_text(hosts: dict[str, NetworkHost]) -> str:
 
 
 @contextlib.contextmanager
-def machines(folder: Path, *options: str, poor: Collection[str] = ()) -> Iterator[ThreeHosts]:
+def machines(
+    folder: Path,
+    *options: str,
+    poor: Collection[str] = (),
+    text: Callable[[dict[str, NetworkHost]], str] = mission_text,
+) -> Iterator[ThreeHosts]:
     """Give three machines, with ``up`` and these options typed on base; nothing of them is left afterwards."""
     with hosts_on_a_switch(folder, "base", "near", "far", poor=poor) as hosts:
         file = hosts["base"].folder / "mission.xml"
-        file.write_text(mission_text(hosts))
+        file.write_text(text(hosts))
         mission = ThreeHosts(hosts, {**os.environ, MARK: uuid.uuid4().hex}, file)
         mission.type_up(*options)
         try:
@@ -271,15 +276,26 @@ def machines(folder: Path, *options: str, poor: Collection[str] = ()) -> Iterato
 
 
 @contextlib.contextmanager
-def mission_on_three_hosts(folder: Path, *options: str, poor: Collection[str] = ()) -> Iterator[ThreeHosts]:
-    """Give the mission when it is whole; take it down afterwards, and see that nothing is left on any machine."""
-    with machines(folder, *options, poor=poor) as mission:
+def mission_on_three_hosts(
+    folder: Path,
+    *options: str,
+    poor: Collection[str] = (),
+    text: Callable[[dict[str, NetworkHost]], str] = mission_text,
+    arcs: Collection[str] = ARCS,
+) -> Iterator[ThreeHosts]:
+    """Give the mission when it is whole; take it down afterwards, and see that nothing is left on any machine.
+
+    Args:
+        text: Returns the mission file.
+        arcs: ARCs that it has.
+    """
+    with machines(folder, *options, poor=poor, text=text) as mission:
         for host in ("near", "far"):
             mission.type_what_up_prints(host)
         mission.wait(
             "all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), READY_WITHIN_S
         )
-        mission.wait("ARCs are there", lambda: mission.components().keys() >= ARCS, 20.0)
+        mission.wait("ARCs are there", lambda: mission.components().keys() >= set(arcs), 20.0)
         there = mission.components().items()
         mission.names = frozenset(name for name, c in there if not c.address.startswith(Subsystem.UI_CONSOLE))
         mission.wait("all are ready", mission.is_whole, 20.0)

@@ -106,7 +106,7 @@ def test_the_stop_is_published_before_its_operator_has_the_answer(local_mission:
 def test_a_full_disk_keeps_no_wheel_turning_and_it_is_told_that_the_stop_is_not_kept(
     local_mission: Any, beside: Any, tmp_path: Path
 ) -> None:
-    (tmp_path / "stops").touch()  # no folder can be made there
+    (tmp_path / "kept").touch()  # no folder can be made there
 
     async def main() -> None:
         async with a_pool(local_mission, ["radio"]) as pool:
@@ -121,9 +121,9 @@ def test_a_full_disk_keeps_no_wheel_turning_and_it_is_told_that_the_stop_is_not_
 def test_a_stop_file_that_cannot_be_read_counts_as_a_stop(tmp_path: Path) -> None:
     file = StopFile(str(tmp_path), "scout1")
     assert file.read() is None
-    (tmp_path / "stops").mkdir()
-    (tmp_path / "stops/scout1").write_bytes(b"half of a")
-    (tmp_path / "stops/scout2").mkdir()
+    (tmp_path / "kept" / "stops").mkdir(parents=True)
+    (tmp_path / "kept/stops/scout1").write_bytes(b"half of a")
+    (tmp_path / "kept/stops/scout2").mkdir()
     for each in (file, StopFile(str(tmp_path), "scout2")):
         state = each.read()
         assert state is not None

@@ -350,8 +350,8 @@ def test_after_a_cut_of_its_link_a_localizer_gets_the_motions_that_it_missed(
 def test_a_memory_that_cannot_be_read_makes_it_sure_of_nothing(tmp_path: Path) -> None:
     async def scene() -> None:
         async with up(mission()) as running:
-            (tmp_path / "localizers").mkdir()
-            (tmp_path / "localizers" / "other").write_bytes(b"torn")
+            (tmp_path / "kept" / "localizers").mkdir(parents=True)
+            (tmp_path / "kept" / "localizers" / "other").write_bytes(b"torn")
             async with another(running, tmp_path) as other:
                 assert (await ask(running, AskPose("scout1"), Pose, other)).spread_m >= LOST_M
 
@@ -361,7 +361,7 @@ def test_a_memory_that_cannot_be_read_makes_it_sure_of_nothing(tmp_path: Path) -
 def test_a_place_where_nothing_can_be_kept_keeps_it_from_nothing(tmp_path: Path) -> None:
     async def scene() -> None:
         async with up(mission()) as running:
-            (tmp_path / "localizers").touch()  # no folder can be made there
+            (tmp_path / "kept").touch()  # no folder can be made there
             async with another(running, tmp_path) as other:
                 applied(running, "move", forward_m_s=0.1, turn_rad_s=0.0)
                 await running.clock.sleep_s(2.0)

@@ -47,7 +47,7 @@ def test_the_next_process_continues_with_the_last_motions_of_the_former(tmp_path
     nxt.publish(motion(9001.0))
     assert numbers(nxt, 9000.0) == [count + 1]
     assert numbers(process(tmp_path, 9999.0))[-1] == count + 1
-    [file] = (tmp_path / "motions").iterdir()
+    [file] = (tmp_path / "kept" / "motions").iterdir()
     assert len(file.read_bytes().splitlines()) <= 2 * KEPT + 1
 
 
@@ -55,7 +55,7 @@ def test_the_line_of_a_process_that_was_killed_while_it_wrote_is_left_out(tmp_pa
     former = process(tmp_path, 5.0)
     for at_s in (6.0, 7.0):
         former.publish(motion(at_s))
-    file = tmp_path / "motions" / "scout1"
+    file = tmp_path / "kept" / "motions" / "scout1"
     file.write_bytes(file.read_bytes()[:-5])
     nxt = process(tmp_path, 9.0)
     assert (nxt.since(0.0).begun_s, numbers(nxt)) == (5.0, [1])
@@ -65,8 +65,8 @@ def test_the_line_of_a_process_that_was_killed_while_it_wrote_is_left_out(tmp_pa
 
 @pytest.mark.parametrize("content", [b"", b"torn", b"5.0\n{}\n", b"{}\n", b"\xff\n"])
 def test_a_file_that_cannot_be_read_means_that_earlier_motions_are_not_known(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "motions").mkdir()
-    (tmp_path / "motions" / "scout1").write_bytes(content)
+    (tmp_path / "kept" / "motions").mkdir(parents=True)
+    (tmp_path / "kept" / "motions" / "scout1").write_bytes(content)
     nxt = process(tmp_path, 9.0)
     assert (nxt.since(0.0).begun_s, numbers(nxt)) == (9.0, [])
 
@@ -90,5 +90,5 @@ def test_a_file_that_lacks_a_motion_is_removed(
         published.publish(motion(8.0))
     published.publish(motion(9.0))
     assert "No space left" in caplog.text
-    assert list((tmp_path / "motions").iterdir()) == []
+    assert list((tmp_path / "kept" / "motions").iterdir()) == []
     assert numbers(published)[-1] == numbers(published)[0] + len(numbers(published)) - 1

@@ -47,8 +47,8 @@ def test_without_a_folder_nothing_is_kept() -> None:
 
 
 def test_a_file_that_cannot_be_read_is_as_none(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    (tmp_path / "worlds").mkdir()
-    (tmp_path / "worlds" / "world").write_bytes(b"torn")
+    (tmp_path / "kept" / "worlds").mkdir(parents=True)
+    (tmp_path / "kept" / "worlds" / "world").write_bytes(b"torn")
     assert file(tmp_path).read() is None
     assert "first places" in caplog.text
 

@@ -13,7 +13,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import NameTaken
 from backbone.creator.messages import creator_name, offer_name
 from backbone.errors import LinkError
-from backbone.launcher.kept_creator import PREDECESSOR_ENDS_S, KeptCreator, Offered
+from backbone.launcher.kept_creator import PREDECESSOR_ENDS_S, KeptCreator, LeftFiles, Offered
 from backbone.naming import Subsystem
 
 BASE = "base"
@@ -36,7 +36,7 @@ def offered(local_mission: Callable[..., Any], beside: Callable[..., Any]) -> Ca
                     offer = launch(offer_name(BASE))
                     bus = network.join(offer.address, clock)
                     creator.start_task(end_after(creator, lives_s), "end")
-                    await KeptCreator(offer, Offered("local", "", BASE)).start(bus, clock)
+                    await KeptCreator(offer, Offered("local", "", BASE), LeftFiles()).start(bus, clock)
 
         async def end_after(creator: Component[NoParameters], lives_s: float) -> None:
             await creator.clock.sleep_s(lives_s)

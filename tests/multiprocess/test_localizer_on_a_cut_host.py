@@ -1,0 +1,64 @@
+"""A localizer on a machine that is cut off for so long that all ends there knows the robots when it is back."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import re
+import time
+from pathlib import Path
+
+import pytest
+from namespaces import NetworkHost
+from test_go_to_mission import GO_TO
+from three_hosts import NAME, ThreeHosts, mission_on_three_hosts
+
+from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
+from backbone.errors import LinkError
+from resource_pool.localization import AskPose, Pose
+
+pytestmark = [pytest.mark.processes, pytest.mark.thorough, pytest.mark.timeout(240)]
+
+FIRST, SECOND, ROBOT = "localizer", "second", "scout1"
+OTHERS = 12  # they keep the behaviors off the machine that is cut
+
+
+def two_localizers(hosts: dict[str, NetworkHost]) -> str:
+    """Return ``go-to.xml`` for three machines, with a second localizer on far."""
+    text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{NAME}", GO_TO.read_text(encoding="utf-8"), count=1)
+    machines = "".join(f'<host name="{name}" address="{host.address}"/>' for name, host in hosts.items())
+    text = re.sub(r'(<resource [^>]*?) process="hardware"', r'\1 host="base"', text)
+    names = [SECOND, *(f"other{number}" for number in range(OTHERS))]
+    more = "".join(f'<resource type="localizer" name="{name}" host="far"/>' for name in names)
+    return text.replace("<resources>", f"<hosts>{machines}</hosts><resources>").replace(
+        "</resources>", f"{more}</resources>"
+    )
+
+
+async def poses(mission: ThreeHosts) -> tuple[Pose, Pose] | None:
+    """Return the robot's pose as both localizers have it; None: one does not answer."""
+    async with mission.bus() as bus:
+        try:
+            first, second = [
+                await bus.ask(f"resource_pool/{one}", AskPose(ROBOT), Pose, within_s=1) for one in (FIRST, SECOND)
+            ]
+        except LinkError:
+            return None
+    return first, second
+
+
+def test_a_localizer_that_is_back_after_a_long_cut_has_all_motions(short_path: Path) -> None:
+    """All robots were at unknown places."""
+    with mission_on_three_hosts(short_path, text=two_localizers, arcs={"go-out-drive"}) as mission:
+        before = asyncio.run(poses(mission))
+        mission.hosts["far"].cut()
+        time.sleep(CUT_OFF_ENDS_WITHIN_S + 1.0)
+        mission.hosts["far"].heal()
+        mission.wait("the second localizer answers", lambda: asyncio.run(poses(mission)), 60.0)
+        after = asyncio.run(poses(mission))
+        assert before is not None
+        assert after is not None
+        first, second = after
+        assert math.dist((before[0].x_m, before[0].y_m), (first.x_m, first.y_m)) > 0.3, "it did not move meanwhile"
+        assert math.dist((first.x_m, first.y_m), (second.x_m, second.y_m)) < 0.05, (after, mission.story())
+        assert second.spread_m < first.spread_m + 0.05, after
