@@ -58,18 +58,18 @@ class ChildKeeper:
         """Return the wanted children that do not run."""
         return [absence for wish in self._wishes.values() if (absence := wish.absence()) is not None]
 
-    async def start(self, name: str) -> None:
-        """Start the child and keep it running."""
-        keeping = self._parent.begin_task(self._keep_child(name), f"child {name}")
+    async def start(self, name: str, order_id: str) -> None:
+        """Start the child and keep it running; see ``Launch.order_id``."""
+        keeping = self._parent.begin_task(self._keep_child(name, order_id), f"child {name}")
         if keeping is not None:
             self._kept[name] = keeping
 
-    async def _keep_child(self, name: str) -> None:
+    async def _keep_child(self, name: str, order_id: str) -> None:
         """Keep the child running until an order stops it; adopt a child of an earlier process of this behavior."""
         node = self._nodes.get(name)
         if node is None:  # the child left the tree before its start
             return
-        wish, at = Wish(name), address(Subsystem.MISSION_CONTROL, name)
+        wish, at = Wish(name, order_id=order_id), address(Subsystem.MISSION_CONTROL, name)
         self._wishes[name], latest = wish, node
 
         def order() -> Start:

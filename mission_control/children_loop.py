@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
@@ -53,6 +54,7 @@ class ChildrenLoop:
         self._has_begun = False
         self._stopping = list[str]()  # as often as stops of a child are not confirmed
         self._left_off: Sequence[str] = ()  # children whose stop an earlier process may not have carried out
+        self._began_s, self._stopped = parent.clock.now_s(), Counter[str]()
         self._waking: asyncio.Task[None] | None = None
         self._wakes_at_s, self._woke_at_s = math.inf, -math.inf
         self._latest_s = -math.inf
@@ -69,11 +71,13 @@ class ChildrenLoop:
 
     def memory(self) -> ChildrenMemory:
         """Return the state from which ``resume`` continues."""
-        return msgspec.structs.replace(self.rules.memory(), stopping=list(self._stopping))
+        return msgspec.structs.replace(
+            self.rules.memory(), stopping=list(self._stopping), began_s=self._began_s, stopped=dict(self._stopped)
+        )
 
     def resume(self, memory: ChildrenMemory) -> None:
         """Continue from the state of an earlier process; call it before ``begin``."""
-        self._left_off = tuple(memory.stopping)
+        self._left_off, self._began_s, self._stopped = tuple(memory.stopping), memory.began_s, Counter(memory.stopped)
         self.rules.resume(memory, self._now_s())
 
     def reported(
@@ -132,6 +136,7 @@ class ChildrenLoop:
         self._parent.rules_applied()
 
     def _child_left(self, name: str) -> None:
+        self._stopped[name] += 1
         self._carry_out(self.rules.left(name, self._now_s()))
 
     async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
@@ -169,10 +174,11 @@ class ChildrenLoop:
             case StartChild(name):
                 self.given_up.pop(name, None)
                 if not self.rules.has_finished:
-                    await self._keeper.start(name)
+                    await self._keeper.start(name, f"{self._began_s:.6f}.{self._stopped[name]}")
             case StopChild(name):
                 await self._keeper.stop(name)
                 self._stopping.remove(name)
+                self._stopped[name] += 1
                 self._parent.keep_memory()
             case FinishParent(status, payload):
                 await self._parent.children_finished(status, payload)

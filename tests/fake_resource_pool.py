@@ -201,7 +201,7 @@ class FakePlacer:
             raise NameTaken(f"{order.name} runs")
         if order.type in self.refusals:
             raise self.refusals[order.type]
-        self._order_ids[order.name] = f"1.{len(self.started)}"
+        self._order_ids[order.name] = order.order_id or f"1.{len(self.started)}"
         return await self._launch(order, requester)
 
     async def _launch(self, order: Start, requester: str) -> Any:

@@ -19,6 +19,7 @@ class Start(Message, frozen=True):
         host: The only possible host; empty: the placer chooses by tags and load.
         tags: Tags that the host must have, besides the tags of the type.
         process: Name of the shared process, whose members run on one host; empty: a process of its own.
+        order_id: See ``Launch``; empty: the placer chooses it.
     """
 
     type: Mention
@@ -27,6 +28,7 @@ class Start(Message, frozen=True):
     host: Mention = ""
     tags: Annotated[list[Mention], FEW] = []
     process: NameOrNone = ""
+    order_id: Mention = ""
 
 
 class Started(Message, frozen=True):

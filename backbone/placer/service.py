@@ -12,7 +12,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import AsyncExitStack
 from functools import partial
-from itertools import chain, count, repeat
+from itertools import chain, repeat
 from typing import Annotated, assert_never
 
 import msgspec
@@ -96,7 +96,6 @@ class Placer(Component[PlacerParameters]):
         )
         self._start_up = BringUp(self._creators, note=self.story.note, is_meeting=self._meetings.are_under_way)
         self._type_locks: dict[str, asyncio.Lock] = {}
-        self._orders = count(1)
         self._starts = self._refused = self._again = self._stops = self._orphans = 0
 
     async def connect(self) -> None:
@@ -170,7 +169,7 @@ class Placer(Component[PlacerParameters]):
             self._book.refuse_second(component_type, name)
             if component_type.multiplicity is Multiplicity.MANY:
                 await alone.aclose()
-            order_id = f"{self.start_number}.{next(self._orders)}"
+            order_id = order.order_id or f"{self.clock.now_s():.6f}"
             spawn = _spawn(name, order, component_type, requester, order_id)
             if not spawn.process and self.parameters.packs is None:
                 spawn = msgspec.structs.replace(spawn, alike_most=component_type.alike_most)

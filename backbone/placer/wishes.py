@@ -15,6 +15,8 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import msgspec
+
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, AskState, ComponentState, LifeState, NameTaken
@@ -42,12 +44,14 @@ class Wish:
         missing_since_s: Mission time at which it was found missing; negative: it is placed, or is being started.
         cause: Why it is missing, in one line.
         started: True if it was ever placed.
+        order_id: Id of all its orders, unique among those for this name; empty: ``keep_placed`` chooses it.
     """
 
     name: str
     missing_since_s: float = -1.0
     cause: str = ""
     started: bool = False
+    order_id: str = ""
     _pause_s: float = PAUSE_FIRST_S
 
     def placed(self) -> None:
@@ -144,6 +148,7 @@ async def keep_placed(
         Refusal: The first start was refused, and the owner decides what follows.
     """
     give_up_s = clock.now_s() + patience_s * clock.rate
+    wish.order_id = wish.order_id or f"{clock.now_s():.6f}"  # the same also if placer and creator die together
     component, placer = PeerMonitor(bus, address), PeerMonitor(bus, PLACER)
     try:
         while True:
@@ -175,7 +180,7 @@ async def _start(
 ) -> tuple[Placement, bool]:
     """Return the placement, and whether the component ran already."""
     while True:
-        order = ordered()
+        order = msgspec.structs.replace(ordered(), order_id=wish.order_id)
         try:
             started = await ask_to_start(bus, clock, wish, order, address, START_WITHIN_S, on_changed)
         except NameTaken:

@@ -12,6 +12,7 @@ from behaviors_of_a_placer import CLASSES, node, root, stop
 from fake_resource_pool import FakePlacer, Run, with_placer
 
 from backbone.atomic_file import replace_file
+from backbone.mission.behavior_orders import behavior_order
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.behavior_memory import CALM_S, MOST_RECALLS
 from mission_control.behaviors.fallback import Fallback
@@ -254,6 +255,27 @@ def test_a_child_that_its_parent_starts_again_begins_anew(kept_world: Run) -> No
         await placer.wait(lambda: placer.components.get("walker") not in (None, first))
         await placer.clock.sleep_s(1.0)
         assert (placer.components["walker"].number, Walker.recalled) == (0, [])
+
+    kept_world(scene)
+
+
+def test_what_is_lost_with_placer_and_creator_carries_on(kept_world: Run) -> None:
+    """The owners order all of it again, by the same ids."""
+
+    async def scene(placer: FakePlacer) -> None:
+        tree = node("top", "sequence", children=[node("a"), node("walker", "walker")])
+        order = msgspec.structs.replace(behavior_order(tree, [("iros2001", 10)]), order_id="1.0")
+        await placer.launch(order)
+        await placer.wait(lambda: "a" in placer.components)
+        placer.components["a"].finish(SUCCESS)
+        await placer.wait(lambda: "walker" in placer.components)
+        placer.components["walker"].step()
+        for name in ("top", "walker"):
+            await placer.kill(name)
+            placer.lose(name)
+        await placer.launch(order)
+        await placer.wait(lambda: "walker" in placer.components)
+        assert (placer.components["walker"].number, placer.started.count("a")) == (1, 1)
 
     kept_world(scene)
 

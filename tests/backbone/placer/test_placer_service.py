@@ -321,3 +321,6 @@ async def test_an_order_has_one_id_until_it_is_stopped(one: Mission) -> None:
     await one.stop("w")
     await one.start("watcher", "w")
     assert order_id() not in (first, "")
+    await one.stop("w")
+    await one.start("watcher", "w", order_id="its owner's")
+    assert order_id() == "its owner's"

@@ -13,8 +13,8 @@ from backbone.bus.interface import Bus, Subscription
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import AskState, ComponentState, LifeState
 from backbone.component.peer_monitor import GONE_AFTER_S
-from backbone.placer.messages import AskPlacement, Placement, Start, Started
-from backbone.placer.wishes import PAUSE_MOST_S, SLOW_START_S, Wish, keep_placed
+from backbone.placer.messages import AskPlacement, NotPlaced, Placement, Start, Started
+from backbone.placer.wishes import COMPARE_EVERY_S, PAUSE_MOST_S, SLOW_START_S, Wish, keep_placed
 from backbone.wire import Envelope, Message
 
 ADDRESS = "resource_pool/grabber"
@@ -114,6 +114,28 @@ def test_what_is_ready_is_not_missed_though_the_answer_to_its_start_is_lost() ->
         serve_component(component)
         await clock.sleep_s(SLOW_START_S + SETTLED_S)
         assert wish.absence() is None
+
+    run_kept(trial)
+
+
+def test_all_orders_of_a_wish_have_one_id() -> None:
+    """A placer that died together with the creator knows no id, and a behavior's memory is of one order."""
+
+    async def trial(clock: VirtualClock, wish: Wish, placer: Bus, component: Bus) -> None:
+        ids: list[str] = []
+
+        async def lose(asked: Envelope[Start | AskPlacement]) -> Message:
+            if isinstance(asked.body, Start):
+                ids.append(asked.body.order_id)
+                return Started("grabber", "here", 1, [])
+            raise NotPlaced("grabber was not placed")
+
+        placer.serve(PLACER, Start | AskPlacement, lose)
+        placer.declare_alive(PLACER)
+        component.declare_alive(ADDRESS)
+        await clock.sleep_s(3 * COMPARE_EVERY_S)
+        assert len(ids) > 1
+        assert set(ids) == {wish.order_id} != {""}
 
     run_kept(trial)
 
