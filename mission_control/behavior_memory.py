@@ -84,8 +84,11 @@ class BehaviorMemory:
             self._write(now)
 
     def recall(self) -> BehaviorStatus:
-        """Continue from what the last process kept under this order, if anything; return the behavior's status."""
-        if (kept := self._read()) is not None:
+        """Continue from what the last process kept under this order, if anything; return the behavior's status.
+
+        A class that warms up beside another one continues from that one's state, not from what is kept.
+        """
+        if self._behavior.gate.is_first and (kept := self._read()) is not None:
             self._continue_from(kept)
         return self._behavior.status
 

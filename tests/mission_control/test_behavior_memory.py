@@ -8,10 +8,11 @@ from typing import Any, ClassVar
 
 import msgspec
 import pytest
-from behaviors_of_a_placer import CLASSES, node, root, stop
+from behaviors_of_a_placer import CLASSES, MADE, node, root, stop
 from fake_resource_pool import FakePlacer, Run, with_placer
 
 from backbone.atomic_file import replace_file
+from backbone.exchange import SwapClass, Swapped
 from backbone.mission.behavior_orders import behavior_order
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.behavior_memory import CALM_S, MOST_RECALLS
@@ -338,6 +339,35 @@ def test_a_behavior_that_finished_by_itself_and_is_killed_still_ends_its_childre
         top = await placer.restart("top")
         await placer.wait(lambda: "a" not in placer.components, within_s=3.0)
         assert top.status is SUCCESS
+
+    kept_world(scene)
+
+
+NEXT = """
+from behaviors_of_a_placer import MADE
+from test_behavior_memory import Walker
+
+
+class Next(Walker):
+    def recall(self, memory):
+        MADE.append(memory)
+"""
+
+
+def test_a_class_that_replaces_another_one_recalls_nothing_beside_it(
+    kept_world: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It gets the present state of the class in charge."""
+    (tmp_path / "next_walker.py").write_text(NEXT)
+    monkeypatch.syspath_prepend(tmp_path)
+    MADE.clear()
+
+    async def scene(placer: FakePlacer) -> None:
+        walker = await root(placer, node("walker", "walker"))
+        walker.step()
+        asked = SwapClass("next_walker:Next", {}, 1.0, 2.0, user="anna")
+        await placer.bus.ask("mission_control/walker", asked, Swapped, within_s=60.0)
+        assert MADE == []
 
     kept_world(scene)
 
