@@ -64,24 +64,29 @@ class BehaviorMemory:
     def __init__(self, behavior: BehaviorOfParts, hooks: BehaviorHooks, children: ChildrenLoop, launch: Launch) -> None:
         self._behavior, self._hooks, self._children, self._order_id = behavior, hooks, children, launch.order_id
         self._file = KeptFile(launch.run_directory if launch.order_id else "", "behaviors", launch.name)
-        self._kept: KeptBehavior | None = None
+        self._content = b""
 
     def keep(self) -> None:
         """Replace the kept state by the present one, if it differs and the implementation is in charge."""
         if not self._behavior.gate.is_open or self._file.path is None:
             return
         of, own = self._behavior, self._hooks.memory()
-        now = KeptBehavior(
-            order_id=self._order_id,
-            parameters=self._parameters(),
-            status=of.status,
-            payload=dict(of.payload) if of.status.is_final else {},
-            children=self._children.memory(),
-            own=b"" if own is None else msgspec.msgpack.encode(own),
-        )
-        before = self._kept and msgspec.structs.replace(self._kept, recalls=0, recalled_s=0.0)
-        if now != before:
-            self._write(now)
+        try:
+            now = KeptBehavior(
+                order_id=self._order_id,
+                parameters=self._parameters(),
+                status=of.status,
+                payload=dict(of.payload) if of.status.is_final else {},
+                children=self._children.memory(),
+                own=b"" if own is None else msgspec.msgpack.encode(own),
+            )
+            content = msgspec.msgpack.encode(now)
+        except (TypeError, ValueError, OverflowError) as error:  # such as a number of numpy in a report
+            self._give_up(error)
+            return
+        if content != self._content:
+            self._content = content
+            self._write(content)
 
     def recall(self) -> BehaviorStatus:
         """Continue from what the last process kept under this order, if anything; return the behavior's status.
@@ -98,7 +103,8 @@ class BehaviorMemory:
         if recalls > MOST_RECALLS:
             behavior.publish_event(behavior.name, "begins anew: it ended again and again without progress")
             return
-        self._write(msgspec.structs.replace(kept, recalls=recalls, recalled_s=now_s))
+        self._content = msgspec.msgpack.encode(msgspec.structs.replace(kept, recalls=0, recalled_s=0.0))
+        self._write(msgspec.msgpack.encode(msgspec.structs.replace(kept, recalls=recalls, recalled_s=now_s)))
         behavior.story.note(behavior.name, "continues from the progress of its last process")
         if kept.status.is_final:
             behavior.status, behavior.payload = kept.status, kept.payload
@@ -131,11 +137,13 @@ class BehaviorMemory:
             return None
         return kept if kept is not None and kept.order_id == self._order_id else None
 
-    def _write(self, kept: KeptBehavior) -> None:
-        self._kept = kept
+    def _write(self, content: bytes) -> None:
         try:
             if (target := self._file.target()) is not None:
-                replace_file(target, msgspec.msgpack.encode(kept), is_lasting=False)
+                replace_file(target, content, is_lasting=False)
         except OSError as error:
-            log.warning("%s: its next process begins anew: %s", self._file.path, error)
-            self._file.give_up()
+            self._give_up(error)
+
+    def _give_up(self, error: Exception) -> None:
+        log.warning("%s: its next process begins anew: %s", self._behavior.name, error)
+        self._file.give_up()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import msgspec
+import numpy as np
 import pytest
 from behaviors_of_a_placer import CLASSES, MADE, node, root, stop
 from fake_resource_pool import FakePlacer, Run, with_placer
@@ -157,6 +158,19 @@ def test_a_damaged_memory_is_left_with_a_warning(
 
     kept_world(scene)
     assert "walker begins anew" in caplog.text
+
+
+def test_a_report_that_cannot_be_written_keeps_a_behavior_from_nothing(
+    kept_world: Run, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        walker = await root(placer, node("walker", "walker"))
+        walker.finish(SUCCESS, {"distance_m": np.float32(1.5)})
+        await placer.clock.sleep_s(1.0)
+        assert (walker.status, placer.components["walker"]) == (SUCCESS, walker)
+
+    kept_world(scene)
+    assert "walker: its next process begins anew: Encoding objects of type numpy.float32" in caplog.text
 
 
 def test_a_behavior_that_ends_again_and_again_without_progress_begins_anew(kept_world: Run) -> None:
