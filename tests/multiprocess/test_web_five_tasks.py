@@ -90,7 +90,7 @@ async def person(served: Served, size: str = "tablet") -> AsyncIterator[Person]:
 
 
 async def drive(one: Person, robot: str) -> None:
-    await one.tap("Take over", one.card(robot))
+    await one.tap(f"Take over {robot}", one.card(robot))
     await one.reads(f"you hold {robot}")
     one.touches += 1
     finger = Finger(one.page)
@@ -152,7 +152,7 @@ async def test_hand_a_robot_to_a_colleague(served: Served) -> None:
     async with person(served, "phone") as colleague, person(served) as one:
         await drive(one, "scout1")
         one.touches = 0
-        await colleague.tap("Take over", colleague.card("scout1"))
+        await colleague.tap("Take over scout1", colleague.card("scout1"))
         await colleague.reads("waiting for scout1")
         await colleague.tap("May I?")
         await one.reads("phone asks for scout1")

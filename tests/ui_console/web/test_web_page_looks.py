@@ -212,3 +212,18 @@ async def test_what_gets_the_focus_is_not_hidden_below_what_stays_on_the_screen(
     async with page_at(stage, size) as page:
         await take(page)
         assert await page.evaluate(COVERED) == []
+
+
+NAMES = """(place) => [...document.querySelectorAll(`${place} button`)]
+    .filter((one) => one.checkVisibility())
+    .map((one) => one.getAttribute("aria-label") ?? one.textContent.trim())"""
+
+
+async def test_no_two_robots_and_no_two_rows_of_a_table_have_buttons_of_one_name(stage: Stage) -> None:
+    """A person who hears the page, or speaks to it, could not tell them apart."""
+    async with page_at(stage) as page:
+        await take(page)
+        names = await page.evaluate(NAMES, ".robot")
+        assert {"Yours scout1", "Take over scout2"} <= set(names)
+        for shown in (names, await page.evaluate(NAMES, "#tables")):
+            assert [name for name in set(shown) if shown.count(name) > 1] == []

@@ -225,7 +225,9 @@ class Card {
     set(this.gauges, lineOf(gauges));
     this.reports.show(gauges);
     const isWanted = own.is_asked && own.robot === this.name;
-    set(this.take, robot.is_mine ? "Yours" : isWanted ? "Waiting…" : "Take over");
+    const take = robot.is_mine ? "Yours" : isWanted ? "Waiting…" : "Take over";
+    set(this.take, take);
+    this.take.setAttribute("aria-label", `${take} ${this.name}`);
     this.take.disabled = robot.is_mine || isWanted === true;
   }
 

@@ -35,10 +35,12 @@ export function make(tag, className = "", text = "") {
  * @param {string} label
  * @param {() => void} press
  * @param {string} [key]
+ * @param {string} [about] What it is about, for those who hear its name.
  */
-export function makeButton(label, press, key = "") {
+export function makeButton(label, press, key = "", about = "") {
   const button = make("button", "", label);
   button.type = "button";
+  if (about) button.setAttribute("aria-label", `${label} ${about}`);
   if (key) button.dataset.key = key;
   button.addEventListener("click", press);
   return button;

@@ -27,11 +27,11 @@ export function showAlarm(alarms, act) {
   } // keeps its place, so that nothing moves under a finger
   const line = make("span");
   line.textContent = `${first.severity}: ${first.line}${first.remedy ? ` — ${first.remedy}` : ""}`;
-  const why = makeButton("Why?", () => act("why", first.subject));
+  const why = makeButton("Why?", () => act("why", first.subject), "", first.subject);
   bar.replaceChildren(
     line,
     why,
-    makeButton("Seen", () => act("acknowledge", first.key)),
+    makeButton("Seen", () => act("acknowledge", first.key), "", first.line),
   );
 }
 

@@ -139,11 +139,11 @@ export class Tables {
   seenOrWhy(row) {
     const both = make("span");
     both.append(
-      makeButton("Why?", () => this.act("why", row.subject), `why:${row.key}`),
+      makeButton("Why?", () => this.act("why", row.subject), `why:${row.key}`, row.subject),
       " ",
       row.acknowledged_by
         ? `seen by ${row.acknowledged_by}`
-        : makeButton("Seen", () => this.act("acknowledge", row.key), `acknowledge:${row.key}`),
+        : makeButton("Seen", () => this.act("acknowledge", row.key), `acknowledge:${row.key}`, row.line),
     );
     return both;
   }
@@ -195,7 +195,7 @@ export class Tables {
         seconds(row.until_s),
         seconds(row.expected_start_s),
         row.because,
-        makeButton("Why?", () => this.act("why", row.arc), `why:${row.arc}`),
+        makeButton("Why?", () => this.act("why", row.arc), `why:${row.arc}`, row.arc),
       ]),
     );
   }
@@ -254,9 +254,9 @@ export class Tables {
   more(name) {
     const both = make("span");
     both.append(
-      makeButton("Why?", () => this.act("why", name), `why:${name}`),
+      makeButton("Why?", () => this.act("why", name), `why:${name}`, name),
       " ",
-      makeButton("Parameters", () => this.askParameters(name), `parameters:${name}`),
+      makeButton("Parameters", () => this.askParameters(name), `parameters:${name}`, `of ${name}`),
     );
     return both;
   }
