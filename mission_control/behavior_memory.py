@@ -108,6 +108,7 @@ class BehaviorMemory:
         behavior.story.note(behavior.name, "continues from the progress of its last process")
         if kept.status.is_final:
             behavior.status, behavior.payload = kept.status, kept.payload
+            behavior.report(f"finished: {kept.status}")
             return
         self._children.resume(kept.children)
         if (own := self._own(kept)) is not None:

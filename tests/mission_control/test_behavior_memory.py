@@ -316,7 +316,8 @@ def test_a_behavior_killed_before_its_parent_knew_its_end_reports_it(kept_world:
         placer.components["a"].finish(FAILURE, {"detail": "the way is blocked"})
         await placer.clock.sleep_s(1.0)
         await die(placer, "a")
-        assert placer.components["a"].status is FAILURE
+        again = placer.components["a"]
+        assert (again.status, again.feedback) == (FAILURE, "finished: failure")
         top = await placer.restart("top")
         await placer.wait(lambda: "b" in placer.components)
         assert top.feedback == "runs b, 2 of 2, because a failed: the way is blocked"
