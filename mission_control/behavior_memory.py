@@ -102,6 +102,7 @@ class BehaviorMemory:
         recalls = kept.recalls + 1 if now_s - kept.recalled_s < CALM_S else 1
         if recalls > MOST_RECALLS:
             behavior.publish_event(behavior.name, "begins anew: it ended again and again without progress")
+            self._children.begun_anew = kept.children.begun_anew + 1
             return
         self._content = msgspec.msgpack.encode(msgspec.structs.replace(kept, recalls=0, recalled_s=0.0))
         self._write(msgspec.msgpack.encode(msgspec.structs.replace(kept, recalls=recalls, recalled_s=now_s)))

@@ -90,7 +90,7 @@ class ChildrenMemory(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
         verdict: Status with which the parent was about to finish.
         verdict_payload: The payload of that.
         stopping: Children whose end was ordered and not confirmed yet.
-        began_s: Mission time at which the first process began.
+        begun_anew: Number of times that the parent began anew under the same order.
         stopped: Child → number of its ends; a child's order has an id of its own after each.
         ends: Number of the decided ends of the child; see ``composites.Again``.
         starts_at_s: Mission time of its next start.
@@ -108,7 +108,7 @@ class ChildrenMemory(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
     verdict: BehaviorStatus | None = None
     verdict_payload: dict[str, object] = {}
     stopping: list[str] = []
-    began_s: float = 0.0
+    begun_anew: int = 0
     stopped: dict[str, int] = {}
     ends: int = 0
     starts_at_s: float = -math.inf

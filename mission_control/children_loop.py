@@ -54,7 +54,8 @@ class ChildrenLoop:
         self._has_begun = False
         self._stopping = list[str]()  # as often as stops of a child are not confirmed
         self._left_off: Sequence[str] = ()  # children whose stop an earlier process may not have carried out
-        self._began_s, self._stopped = parent.clock.now_s(), Counter[str]()
+        self.begun_anew, self._stopped = 0, Counter[str]()
+        """Number of times that the parent began anew under the same order."""
         self._waking: asyncio.Task[None] | None = None
         self._wakes_at_s, self._woke_at_s = math.inf, -math.inf
         self._latest_s = -math.inf
@@ -72,12 +73,13 @@ class ChildrenLoop:
     def memory(self) -> ChildrenMemory:
         """Return the state from which ``resume`` continues."""
         return msgspec.structs.replace(
-            self.rules.memory(), stopping=list(self._stopping), began_s=self._began_s, stopped=dict(self._stopped)
+            self.rules.memory(), stopping=list(self._stopping), begun_anew=self.begun_anew, stopped=dict(self._stopped)
         )
 
     def resume(self, memory: ChildrenMemory) -> None:
         """Continue from the state of an earlier process; call it before ``begin``."""
-        self._left_off, self._began_s, self._stopped = tuple(memory.stopping), memory.began_s, Counter(memory.stopped)
+        self._left_off, self._stopped = tuple(memory.stopping), Counter(memory.stopped)
+        self.begun_anew = memory.begun_anew
         self.rules.resume(memory, self._now_s())
 
     def reported(
@@ -131,6 +133,11 @@ class ChildrenLoop:
             self.given_up[name] = Absence(name, self._clock.now_s(), cause, remedy=remedy)
             self._parent.changed()
 
+    def _order_id(self, name: str) -> str:
+        """Return the id of the present order of this child, which is another one after each of its ends."""
+        own = self._parent.launch.order_id
+        return own and f"{own}.{self.begun_anew}.{self._stopped[name]}"
+
     def _child_fell(self, name: str, how: str) -> None:
         self.rules.fell(name, how)
         self._parent.rules_applied()
@@ -174,7 +181,7 @@ class ChildrenLoop:
             case StartChild(name):
                 self.given_up.pop(name, None)
                 if not self.rules.has_finished:
-                    await self._keeper.start(name, f"{self._began_s:.6f}.{self._stopped[name]}")
+                    await self._keeper.start(name, self._order_id(name))
             case StopChild(name):
                 await self._keeper.stop(name)
                 self._stopping.remove(name)

@@ -144,7 +144,7 @@ class WishKeeper:
             Refusal: The component did not start.
         """
         bus, clock, changed = self._launcher.bus, self._launcher.clock, self._launcher.changed
-        wish = Wish(order.name, started=was_started)
+        wish = Wish(order.name, started=was_started, order_id=f"{clock.now_s():.6f}")
         self._wishes.append(wish)
         until_s = time.monotonic() + MEET_TIME_S
         try:

@@ -44,7 +44,7 @@ class Wish:
         missing_since_s: Mission time at which it was found missing; negative: it is placed, or is being started.
         cause: Why it is missing, in one line.
         started: True if it was ever placed.
-        order_id: Id of all its orders, unique among those for this name; empty: ``keep_placed`` chooses it.
+        order_id: Id of all its orders, the same also if placer and creator die together; empty: the placer chooses it.
     """
 
     name: str
@@ -148,7 +148,6 @@ async def keep_placed(
         Refusal: The first start was refused, and the owner decides what follows.
     """
     give_up_s = clock.now_s() + patience_s * clock.rate
-    wish.order_id = wish.order_id or f"{clock.now_s():.6f}"  # the same also if placer and creator die together
     component, placer = PeerMonitor(bus, address), PeerMonitor(bus, PLACER)
     try:
         while True:

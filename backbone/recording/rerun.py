@@ -25,6 +25,7 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation, address_of
 from backbone.keys import key as key_of
 from backbone.naming import Subsystem, component_of, did_you_mean
+from backbone.placer.messages import Start
 from backbone.recording.hearing import Hearing, to_overhear
 from backbone.recording.known_messages import message_classes
 from backbone.recording.presence import Presence
@@ -37,6 +38,7 @@ MOST_WAITING_BYTES = 2**31
 NANOSECOND_S = 1e-9  # MCAP specification: times are whole nanoseconds
 Known = Mapping[str, type[Message]]
 ComponentType = Callable[[Launch, Bus, Clock], AnyComponent]
+_TELL_OF_LAUNCHES = frozenset(schema_of(each) for each in (ComponentState, Parameters, Start, Types))
 
 
 class NoSuchComponent(Refusal):
@@ -76,9 +78,10 @@ def launch_of(recording: Recording, classes: Known, name: str) -> Launch:
     parameters: Parameters | None = None
     types: dict[str, str] = {}
     seen: set[str] = set()
+    order_id = ""
     incarnation = _incarnation(recording, name)
     for message in recording.messages():
-        if message.schema in (schema_of(ComponentState), schema_of(Parameters), schema_of(Types)):
+        if message.schema in _TELL_OF_LAUNCHES:
             said = message_as_sent(classes, message)
             match said:
                 case ComponentState():
@@ -87,6 +90,8 @@ def launch_of(recording: Recording, classes: Known, name: str) -> Launch:
                         state = said
                 case Parameters() if parameters is None and component_of(message.source) == name:
                     parameters = said
+                case Start() if said.name == name:
+                    order_id = said.order_id
                 case Types():
                     types |= {one.component_type.name: one.component_type.class_path for one in said.types}
         if state is not None and parameters is not None and state.type in types:
@@ -103,6 +108,7 @@ def launch_of(recording: Recording, classes: Known, name: str) -> Launch:
                 parameters.values,
                 state.requester,
                 incarnation=incarnation,
+                order_id=order_id,
             )
     lacks = "state" if state is None else "parameters" if parameters is None else f"type {state.type!r}"
     hint = did_you_mean(name, seen) if state is None else ""
