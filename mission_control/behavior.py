@@ -280,7 +280,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if keeper is not None:
             self.begin_task(self._end_with_keeper(keeper), "keeper")
             await keeper.wait_noted()
-        if self._memory.recall().is_final:
+        if await self._memory.recall():
             self.begin_task(self._wind_up(), "wind-up")
             return
         await self.start()

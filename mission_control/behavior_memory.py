@@ -1,23 +1,29 @@
 """BehaviorMemory: keeps the progress of a behavior for its next process.
 
-A process that is killed loses what it knew. The behavior's next process on this host continues from a file of the
-mission's folder, if both carry out the same order of the owner: a child that its parent starts again begins anew.
+A process that is killed loses what it knew. The behavior's next process continues from a file of the mission's folder
+or, on another host, from the placer's copy, if both carry out the same order of the owner: a child that its parent
+starts again begins anew.
 
 If the behavior ends again and again without any progress, its memory may be the cause, so it begins anew.
 """
 
 from __future__ import annotations
 
+import asyncio
 import logging
 
 import msgspec
 
+from backbone.addresses import PLACER
 from backbone.atomic_file import replace_file
 from backbone.component.launch import Launch
+from backbone.errors import LinkError, Refusal
 from backbone.kept_file import KeptFile
 from backbone.mission.behavior_orders import TREE_PARAMETERS
+from backbone.placer.messages import AskMemory, KeepMemory, Memory, MemoryKept
 from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.behavior_of_parts import BehaviorOfParts
+from mission_control.child_keeper import AGAIN_AFTER_S, REPLY_TIME_S
 from mission_control.children import ChildrenMemory
 from mission_control.children_loop import ChildrenLoop
 from mission_control.messages import BehaviorStatus
@@ -38,6 +44,7 @@ class KeptBehavior(msgspec.Struct, frozen=True, kw_only=True):
         payload: The last report, if it is final.
         children: State of the rules for its children.
         own: Its ``memory_type``, encoded; empty: none.
+        kept_s: Mission time of the change.
         recalls: Number of processes that continued from this and did not live for long.
         recalled_s: Mission time of the last of them.
     """
@@ -48,6 +55,7 @@ class KeptBehavior(msgspec.Struct, frozen=True, kw_only=True):
     payload: dict[str, object]
     children: ChildrenMemory
     own: bytes
+    kept_s: float = 0.0
     recalls: int = 0
     recalled_s: float = 0.0
 
@@ -65,10 +73,12 @@ class BehaviorMemory:
         self._behavior, self._hooks, self._children, self._order_id = behavior, hooks, children, launch.order_id
         self._file = KeptFile(launch.run_directory if launch.order_id else "", "behaviors", launch.name)
         self._content = b""
+        self._unsent: bytes | None = None
+        self._sending: asyncio.Task[None] | None = None
 
     def keep(self) -> None:
         """Replace the kept state by the present one, if it differs and the implementation is in charge."""
-        if not self._behavior.gate.is_open or self._file.path is None:
+        if not self._behavior.gate.is_open or not self._order_id:
             return
         of, own = self._behavior, self._hooks.memory()
         try:
@@ -86,16 +96,19 @@ class BehaviorMemory:
             return
         if content != self._content:
             self._content = content
-            self._write(content)
+            self._write(msgspec.structs.replace(now, kept_s=of.clock.now_s()))
 
-    def recall(self) -> BehaviorStatus:
-        """Continue from what the last process kept under this order, if anything; return the behavior's status.
+    async def recall(self) -> bool:
+        """Continue from what the last process kept under this order, if anything; return whether it had finished.
 
         A class that warms up beside another one continues from that one's state, not from what is kept.
         """
-        if self._behavior.gate.is_first and (kept := self._read()) is not None:
-            self._continue_from(kept)
-        return self._behavior.status
+        if self._behavior.gate.is_first and self._order_id:
+            left = [kept for kept in (self._read(), await self._left_with_placer()) if kept is not None]
+            if left and not self._behavior.status.is_final:  # it may have been finished meanwhile
+                self._continue_from(max(left, key=lambda kept: kept.kept_s))
+                return self._behavior.status.is_final
+        return False
 
     def _continue_from(self, kept: KeptBehavior) -> None:
         behavior, now_s = self._behavior, self._behavior.clock.now_s()
@@ -104,8 +117,8 @@ class BehaviorMemory:
             behavior.publish_event(behavior.name, "begins anew: it ended again and again without progress")
             self._children.begun_anew = kept.children.begun_anew + 1
             return
-        self._content = msgspec.msgpack.encode(msgspec.structs.replace(kept, recalls=0, recalled_s=0.0))
-        self._write(msgspec.msgpack.encode(msgspec.structs.replace(kept, recalls=recalls, recalled_s=now_s)))
+        self._content = msgspec.msgpack.encode(msgspec.structs.replace(kept, kept_s=0.0, recalls=0, recalled_s=0.0))
+        self._write(msgspec.structs.replace(kept, recalls=recalls, recalled_s=now_s))
         behavior.story.note(behavior.name, "continues from the progress of its last process")
         if kept.status.is_final:
             behavior.status, behavior.payload = kept.status, kept.payload
@@ -133,18 +146,52 @@ class BehaviorMemory:
     def _read(self) -> KeptBehavior | None:
         try:
             found = self._file.read()
-            kept = None if found is None else msgspec.msgpack.decode(found, type=KeptBehavior)
-        except (OSError, msgspec.DecodeError) as error:
-            log.warning("%s begins anew: %s: %s", self._behavior.name, self._file.path, error)
+        except OSError as error:
+            log.warning("%s: %s", self._file.path, error)
             return None
-        return kept if kept is not None and kept.order_id == self._order_id else None
+        return None if found is None else self._decoded(found, f"its file {self._file.path}")
 
-    def _write(self, content: bytes) -> None:
+    async def _left_with_placer(self) -> KeptBehavior | None:
+        try:
+            left = await self._behavior.bus.ask(PLACER, AskMemory(self._order_id), Memory, within_s=REPLY_TIME_S)
+        except (LinkError, Refusal) as error:
+            log.info("%s: the placer does not answer with its memory: %s", self._behavior.name, error)
+            return None
+        return self._decoded(left.content, "the placer's copy") if left.content else None
+
+    def _decoded(self, content: bytes, what: str) -> KeptBehavior | None:
+        try:
+            kept = msgspec.msgpack.decode(content, type=KeptBehavior)
+        except msgspec.DecodeError as error:
+            log.warning("%s cannot continue from %s: %s", self._behavior.name, what, error)
+            return None
+        return kept if kept.order_id == self._order_id else None
+
+    def _write(self, kept: KeptBehavior) -> None:
+        content = self._unsent = msgspec.msgpack.encode(kept)
+        if self._sending is None:
+            self._sending = self._behavior.begin_task(self._send(), "memory")
         try:
             if (target := self._file.target()) is not None:
                 replace_file(target, content, is_lasting=False)
         except OSError as error:
             self._give_up(error)
+
+    async def _send(self) -> None:
+        """Send the newest state to the placer, until it has it."""
+        bus, clock = self._behavior.bus, self._behavior.clock
+        while self._unsent is not None:
+            content = self._unsent
+            try:
+                await bus.ask(PLACER, KeepMemory(self._order_id, content), MemoryKept, within_s=REPLY_TIME_S)
+            except LinkError:
+                await clock.sleep_s(AGAIN_AFTER_S * clock.rate)
+                continue
+            except Refusal as refusal:
+                log.info("%s: the placer does not keep its memory: %s", self._behavior.name, refusal)
+            if self._unsent is content:
+                self._unsent = None
+        self._sending = None
 
     def _give_up(self, error: Exception) -> None:
         log.warning("%s: its next process begins anew: %s", self._behavior.name, error)

@@ -16,11 +16,15 @@ from backbone.component.messages import NameTaken, Stop, Stopping
 from backbone.creator.messages import EndedBy, ProcessFell
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
-from backbone.naming import Subsystem, address
+from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import (
+    AskMemory,
     AskPlacement,
     Ended,
+    KeepMemory,
     ListPlacements,
+    Memory,
+    MemoryKept,
     NotPlaced,
     Placement,
     Placements,
@@ -172,6 +176,7 @@ class FakePlacer:
         self.stop_takes_s: dict[str, float] = {}
         self.on_arc: Callable[[FakeArc], None] = lambda arc: None
         self.run_directory = ""
+        self.memories: dict[str, bytes] = {}
         self._order_ids: dict[str, str] = {}
         self._lives: dict[str, asyncio.Task[None]] = {}
         self.bus = network.join(PLACER, clock)
@@ -291,6 +296,11 @@ class FakePlacer:
             case ReviseStart() as revised:
                 self.revised.append(revised)
                 return StartRevised()
+            case KeepMemory(content=content):
+                self.memories[component_of(asked.source)] = content
+                return MemoryKept()
+            case AskMemory():
+                return Memory(self.memories.get(component_of(asked.source), b""))
             case AskPlacement(name=name):
                 if name not in self.placed:
                     raise NotPlaced(f"{name} is not placed", stopped=name in self.stopped)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from backbone.creator.messages import EndedBy
 from backbone.errors import Refusal
-from backbone.ranges import FEW, MANY, Instant, Line, Mention, NameOrNone, Pid, Text, Values
+from backbone.ranges import FEW, MANY, Instant, Line, Mention, NameOrNone, Pid, Quoted, Text, Values
 from backbone.wire import Message
 
 
@@ -116,6 +116,38 @@ class Placements(Message, frozen=True):
     stopped: Annotated[dict[Mention, Text], MANY] = {}
 
 
+class KeepMemory(Message, frozen=True):
+    """Keep what the asking component leaves for its next process, which may be on another host.
+
+    Attributes:
+        order_id: See ``Launch``; nothing is kept for an order that is over.
+        content: Its memory, encoded.
+    """
+
+    order_id: Mention
+    content: Quoted
+
+
+class MemoryKept(Message, frozen=True):
+    """Answer to ``KeepMemory``."""
+
+
+class AskMemory(Message, frozen=True):
+    """Ask for the memory that the last process of the asking component left under this order."""
+
+    order_id: Mention
+
+
+class Memory(Message, frozen=True):
+    """Answer to ``AskMemory``.
+
+    Attributes:
+        content: The memory; empty: none.
+    """
+
+    content: Quoted = b""
+
+
 # Anyone → the launcher, which has the orders of the mission file.
 
 
@@ -163,4 +195,4 @@ class NotPlaced(Refusal):
     remedy = "See 'scout-backbone status' for the names of all components."
 
 
-PlacerQuestion = Start | ReviseStart | StopComponent | AskPlacement | ListPlacements
+PlacerQuestion = Start | ReviseStart | StopComponent | AskPlacement | ListPlacements | KeepMemory | AskMemory

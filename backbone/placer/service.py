@@ -29,18 +29,23 @@ from backbone.creator.messages import TYPE as CREATOR
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
-from backbone.naming import legal
+from backbone.naming import component_of, legal
 from backbone.placer.bring_up import BringUp
 from backbone.placer.creators import ANSWER_EACH_S, ANSWER_WITHIN_S, SPAWN_WITHIN_S, Creators, creator_of
 from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase, PlacementRecord
 from backbone.placer.exchanged_orders import revised
 from backbone.placer.hosts_file import HostsFile
 from backbone.placer.meetings import Meetings, Work
+from backbone.placer.memories import Memories
 from backbone.placer.messages import (
+    AskMemory,
     AskPlacement,
     CreatorSilent,
     Ended,
+    KeepMemory,
     ListPlacements,
+    Memory,
+    MemoryKept,
     NoHost,
     NotPlaced,
     Placements,
@@ -83,6 +88,7 @@ class Placer(Component[PlacerParameters]):
         self._book = PlacementBook(self.parameters.packs or 0)
         self._queue: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
         self._hosts_file = HostsFile(launch.run_directory)
+        self._memories = Memories(launch.run_directory)
         self._happened = News(clock)
         self._creators = Creators(bus, clock, self._book, self._happened)
         self._meetings = Meetings(
@@ -128,6 +134,10 @@ class Placer(Component[PlacerParameters]):
                 if record.unwanted:
                     raise NotPlaced(f"{name} is being stopped", name=name, stopped=True)
                 return record.placement()
+            case KeepMemory() as memory:
+                return self._keep_memory(component_of(asked.source), memory)
+            case AskMemory(order_id=order_id):
+                return Memory(self._memories.of(component_of(asked.source), order_id))
             case ListPlacements():
                 return Placements([record.placement() for record in self._book.records()], self._book.stopped())
             case other:
@@ -199,6 +209,12 @@ class Placer(Component[PlacerParameters]):
             raise NoHost(f"{name}: the component database does not admit it: {error}", name=name) from error
         return admitted.component_type
 
+    def _keep_memory(self, name: str, memory: KeepMemory) -> MemoryKept:
+        record = self._book.find(name)
+        if record is not None and record.spawn.order_id == memory.order_id:
+            self._memories.keep(name, memory)
+        return MemoryKept()
+
     async def _revise(self, by: ReviseStart) -> StartRevised:
         record = self._book.record(by.name)
         record.spawn = revised(record.spawn, by)
@@ -221,6 +237,7 @@ class Placer(Component[PlacerParameters]):
         found = self._book.find(name)
         if found is None or found is record:
             self._book.stop_ordered(name, reason)
+            self._memories.forget(name)
         self._stops += 1
         self.story.note(name, f"is stopped, by {by}")
         self._stop_owned(record.address, f"its owner {name} was stopped")

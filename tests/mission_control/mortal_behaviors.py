@@ -75,4 +75,6 @@ MORTALS = {
 async def die(placer: FakePlacer, name: str) -> Any:
     """Kill it, and start it again as its creator does."""
     await placer.kill(name)
-    return await placer.restart(name)
+    again = await placer.restart(name)
+    await placer.clock.sleep_s(0.1)  # it asks for its memory
+    return again

@@ -57,20 +57,57 @@ def test_a_memory_for_another_work_is_not_used(kept_world: Run, kind: str) -> No
     kept_world(scene)
 
 
+def test_a_behavior_continues_on_another_host(kept_world: Run, tmp_path: Path) -> None:
+    """From the placer's copy; back on the first host, from the newer one of both."""
+
+    async def scene(placer: FakePlacer) -> None:
+        walker = await root(placer, node("walker", "walker"))
+        for host in ("other", "first", "other"):
+            walker.step()
+            await placer.clock.sleep_s(1.0)
+            placer.run_directory = str(tmp_path / host)
+            (tmp_path / host).mkdir(exist_ok=True)
+            walker = await die(placer, "walker")
+        assert walker.number == 3
+
+    kept_world(scene)
+
+
+def test_the_newest_progress_reaches_a_placer_that_was_away(kept_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        walker = await root(placer, node("walker", "walker"))
+        await placer.clock.sleep_s(1.0)
+        placer.silence()
+        for _ in range(3):
+            walker.step()
+            await placer.clock.sleep_s(1.0)
+        placer.speak()
+        await placer.clock.sleep_s(1.0)
+        placer.run_directory = ""
+        assert (await die(placer, "walker")).number == 3
+
+    kept_world(scene)
+
+
+@pytest.mark.parametrize("is_copied", [True, False])
 def test_a_damaged_memory_is_left_with_a_warning(
-    kept_world: Run, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    kept_world: Run, tmp_path: Path, caplog: pytest.LogCaptureFixture, *, is_copied: bool
 ) -> None:
     async def scene(placer: FakePlacer) -> None:
         walker = await root(placer, node("walker", "walker"))
         walker.step()
+        await placer.clock.sleep_s(1.0)
         replace_file(tmp_path / "kept" / "behaviors" / "walker", b"\x99torn")
+        if not is_copied:
+            placer.memories["walker"] = b"\x99torn"
         walker = await die(placer, "walker")
-        assert walker.number == 0
+        assert walker.number == is_copied
         walker.step()
-        assert (await die(placer, "walker")).number == 1
+        assert (await die(placer, "walker")).number == 1 + is_copied
 
     kept_world(scene)
-    assert "walker begins anew" in caplog.text
+    assert "walker cannot continue from its file" in caplog.text
+    assert ("walker cannot continue from the placer's copy" in caplog.text) is not is_copied
 
 
 def test_a_report_that_cannot_be_written_keeps_a_behavior_from_nothing(

@@ -80,6 +80,7 @@ def test_a_claim_is_made_as_the_tree_is_now(placer_world: Run) -> None:
 def test_a_parent_that_has_finished_says_so_and_starts_nothing(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         top = await root(placer, node("top", "parent", 5, children=[node("a")]))
+        await placer.wait(lambda: "a" in placer.components)
         top.finish(BehaviorStatus.SUCCESS)
         await placer.wait(lambda: placer.ended == ["a"])
         assert await take(placer, 1, node("top", "parent", 5, children=[node("b")])) == BranchTaken("success")

@@ -156,6 +156,7 @@ def test_a_child_that_a_parent_goes_on_without_is_reported_with_its_cause(placer
 def test_only_children_may_report(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
         report = ChildReport("leaf", BehaviorStatus.SUCCESS)
         with pytest.raises(NotAChild):
             await placer.bus.ask("mission_control/top", report, ReportNoted, within_s=1.0)

@@ -64,6 +64,7 @@ def test_a_killed_behavior_knows_its_progress(local_mission: Any, tmp_path: Path
         before.keep_memory()
         await placer.kill("it")
         after = await placer.restart("it")
+        await placer.clock.sleep_s(0.1)  # it asks for its memory
         assert after.memory() == before.memory() != fresh
 
     with_placer(local_mission, {"it": kind})(scene)
