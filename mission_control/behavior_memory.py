@@ -41,7 +41,7 @@ class KeptBehavior(msgspec.Struct, frozen=True, kw_only=True):
         order_id: See ``Launch``.
         parameters: Its own parameters, without those of the tree.
         status: Its status; final: it only has to report it.
-        payload: The last report, if it is final.
+        payload: The last report, encoded, if it is final; else empty.
         children: State of the rules for its children.
         own: Its ``memory_type``, encoded; empty: none.
         kept_s: Mission time of the change.
@@ -52,7 +52,7 @@ class KeptBehavior(msgspec.Struct, frozen=True, kw_only=True):
     order_id: str
     parameters: dict[str, object]
     status: BehaviorStatus
-    payload: dict[str, object]
+    payload: bytes
     children: ChildrenMemory
     own: bytes
     kept_s: float = 0.0
@@ -72,7 +72,7 @@ class BehaviorMemory:
     def __init__(self, behavior: BehaviorOfParts, hooks: BehaviorHooks, children: ChildrenLoop, launch: Launch) -> None:
         self._behavior, self._hooks, self._children, self._order_id = behavior, hooks, children, launch.order_id
         self._file = KeptFile(launch.run_directory if launch.order_id else "", "behaviors", launch.name)
-        self._content = b""
+        self._kept: KeptBehavior | None = None
         self._unsent: bytes | None = None
         self._sending: asyncio.Task[None] | None = None
 
@@ -80,23 +80,26 @@ class BehaviorMemory:
         """Replace the kept state by the present one, if it differs and the implementation is in charge."""
         if not self._behavior.gate.is_open or not self._order_id:
             return
+        now = self._present()
+        if now is not None and now != self._kept:
+            self._kept = now
+            self._write(msgspec.structs.replace(now, kept_s=self._behavior.clock.now_s()))
+
+    def _present(self) -> KeptBehavior | None:
+        """Return the present state; None: it cannot be encoded."""
         of, own = self._behavior, self._hooks.memory()
         try:
-            now = KeptBehavior(
+            return KeptBehavior(
                 order_id=self._order_id,
                 parameters=self._parameters(),
                 status=of.status,
-                payload=dict(of.payload) if of.status.is_final else {},
+                payload=msgspec.msgpack.encode(of.payload if of.status.is_final else {}),
                 children=self._children.memory(),
                 own=b"" if own is None else msgspec.msgpack.encode(own),
             )
-            content = msgspec.msgpack.encode(now)
-        except (TypeError, ValueError, OverflowError) as error:  # such as a number of numpy in a report
+        except (TypeError, OverflowError) as error:  # such as a number of numpy in a report
             self._give_up(error)
-            return
-        if content != self._content:
-            self._content = content
-            self._write(msgspec.structs.replace(now, kept_s=of.clock.now_s()))
+            return None
 
     async def recall(self) -> bool:
         """Continue from what the last process kept under this order, if anything; return whether it had finished.
@@ -105,9 +108,12 @@ class BehaviorMemory:
         """
         if self._behavior.gate.is_first and self._order_id:
             left = [kept for kept in (self._read(), await self._left_with_placer()) if kept is not None]
-            if left and not self._behavior.status.is_final:  # it may have been finished meanwhile
+            if self._behavior.status.is_final:  # it was finished meanwhile
+                return False
+            if left:
                 self._continue_from(max(left, key=lambda kept: kept.kept_s))
                 return self._behavior.status.is_final
+            self._kept = self._present()  # that of a process that knows nothing is not kept
         return False
 
     def _continue_from(self, kept: KeptBehavior) -> None:
@@ -117,11 +123,11 @@ class BehaviorMemory:
             behavior.publish_event(behavior.name, "begins anew: it ended again and again without progress")
             self._children.begun_anew = kept.children.begun_anew + 1
             return
-        self._content = msgspec.msgpack.encode(msgspec.structs.replace(kept, kept_s=0.0, recalls=0, recalled_s=0.0))
+        self._kept = msgspec.structs.replace(kept, kept_s=0.0, recalls=0, recalled_s=0.0)
         self._write(msgspec.structs.replace(kept, recalls=recalls, recalled_s=now_s))
         behavior.story.note(behavior.name, "continues from the progress of its last process")
         if kept.status.is_final:
-            behavior.status, behavior.payload = kept.status, kept.payload
+            behavior.status, behavior.payload = kept.status, msgspec.msgpack.decode(kept.payload)
             behavior.report(f"finished: {kept.status}")
             return
         self._children.resume(kept.children)
@@ -168,14 +174,14 @@ class BehaviorMemory:
         return kept if kept.order_id == self._order_id else None
 
     def _write(self, kept: KeptBehavior) -> None:
-        content = self._unsent = msgspec.msgpack.encode(kept)
-        if self._sending is None:
-            self._sending = self._behavior.begin_task(self._send(), "memory")
         try:
+            content = self._unsent = msgspec.msgpack.encode(kept)
             if (target := self._file.target()) is not None:
                 replace_file(target, content, is_lasting=False)
-        except OSError as error:
+        except (OSError, TypeError, OverflowError) as error:
             self._give_up(error)
+        if self._sending is None:
+            self._sending = self._behavior.begin_task(self._send(), "memory")
 
     async def _send(self) -> None:
         """Send the newest state to the placer, until it has it."""

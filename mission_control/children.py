@@ -86,7 +86,7 @@ class ChildrenMemory(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tr
         open: The open children.
         status: Final status of the finished children.
         payload: Their last reports.
-        suspensions: Started children that have no grant.
+        suspensions: Started children that have no grant, if the parent's patience with them counts.
         verdict: Status with which the parent was about to finish.
         verdict_payload: The payload of that.
         stopping: Children whose end was ordered and not confirmed yet.
@@ -178,7 +178,6 @@ class Children:
             open=list(self._open),
             status=finished,
             payload={name: dict(self.payload.get(name, {})) for name in finished},
-            suspensions=dict(self.suspensions),
         )
         if self._verdict is None:
             return memory

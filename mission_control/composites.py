@@ -58,6 +58,13 @@ class Composite(Children):
         super().__init__(names, together=together)
         self.while_suspended, self.patience_s = while_suspended, patience_s
 
+    def memory(self) -> ChildrenMemory:
+        """Return the state, with the suspensions if the patience counts; see ``Children.memory``."""
+        memory = super().memory()
+        if self.while_suspended in (WhileSuspended.WAIT, WhileSuspended.COUNT):
+            return memory
+        return msgspec.structs.replace(memory, suspensions=dict(self.suspensions))
+
     def _settle(self, now_s: float) -> list[Instruction]:
         """Arrange the children, also if there are none, because the parent then finishes."""
         return self._arrange(now_s)
