@@ -76,10 +76,10 @@ async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Ser
 
         await take(page, "rover1")
         await page.get_by_role("slider", name="closed").fill("1")
-        await page.get_by_role("button", name="Grip").click()
+        await page.locator("#commands").get_by_role("button", name="Grip", exact=True).click()
         await wait_until(is_applied("grip", closed=1.0), "the gripper closes", WITHIN_S)
 
         await take(page, "wall-camera")
         await page.get_by_role("slider", name="pan").fill("-0.28")
-        await page.get_by_role("button", name="Look").click()
+        await page.locator("#commands").get_by_role("button", name="Look", exact=True).click()
         await wait_until(is_applied("look", pan_rad=-0.28), "the camera pans", WITHIN_S)
