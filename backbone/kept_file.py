@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from copy import copy
 from pathlib import Path
 
 from backbone.atomic_file import replace_file
@@ -38,6 +39,12 @@ class KeptFile:
         if self._run_directory is None or self._found is None or _identity(self._run_directory) != self._found:
             return None
         return self._run_directory / FOLDER / self._kind / self._name
+
+    def of(self, name: str) -> KeptFile:
+        """Return the file of another component, of the same kind and in the folder that was found."""
+        other = copy(self)
+        other._name = name  # noqa: SLF001  of this class
+        return other
 
     def give_up(self) -> None:
         """Keep nothing from now on."""

@@ -146,8 +146,9 @@ class BehaviorMemory:
             return None
 
     def _parameters(self) -> dict[str, object]:
-        given = msgspec.to_builtins(self._behavior.parameters)
-        return {name: value for name, value in given.items() if name not in TREE_PARAMETERS}
+        given = self._behavior.parameters
+        own = (name for name in given.__struct_fields__ if name not in TREE_PARAMETERS)
+        return {name: msgspec.to_builtins(getattr(given, name)) for name in own}
 
     def _read(self) -> KeptBehavior | None:
         try:

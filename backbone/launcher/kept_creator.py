@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,7 @@ from backbone.creator.messages import TYPE, ProcessFell, ProcessState, creator_n
 from backbone.creator.preload import preloaded_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
+from backbone.errors import LinkError
 from backbone.incarnation import Incarnation
 from backbone.kept_file import kept_files, put_back
 from backbone.launcher.core_launches import CORE_POLICY
@@ -26,6 +28,8 @@ from backbone.launcher.folder_watch import wait_removed
 from backbone.launcher.mission_connection import REPLY_TIME_S
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
+
+log = logging.getLogger(__name__)
 
 READY_WITHIN_S = 20.0  # chosen: as for the creators that a launcher starts
 PREDECESSOR_ENDS_S = 5.0  # chosen: a killed offer's creator ends within 3 s; seconds of the machine
@@ -109,9 +113,9 @@ class KeptCreator:
         await _wait_free(bus, clock, creator_name(self._launch.host))
         answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
         types = [counted.component_type for counted in answered.types]
-        run = (await bus.ask(LAUNCHER, AskState(), ComponentState, within_s=REPLY_TIME_S)).incarnation
+        run = await run_of(bus)
         self._directory = directory = prepared_folder(self._offered)
-        if self._left.run == run:
+        if run is not None and self._left.run == run:
             put_back(directory, self._left.files)
         self._left.run = run
         self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))
@@ -155,6 +159,15 @@ class KeptCreator:
             requester=self._launch.address,
             run_directory=str(directory),
         )
+
+
+async def run_of(bus: Bus) -> Incarnation | None:
+    """Return the launcher of the mission's run; None: it does not answer, which keeps no machine out."""
+    try:
+        return (await bus.ask(LAUNCHER, AskState(), ComponentState, within_s=REPLY_TIME_S)).incarnation
+    except LinkError as error:
+        log.warning("the launcher does not answer, so the files from before a cut are not used: %s", error)
+        return None
 
 
 async def _wait_free(bus: Bus, clock: Clock, name: str) -> None:

@@ -24,14 +24,14 @@ class Memories:
     """
 
     def __init__(self, run_directory: str) -> None:
-        self._run_directory = run_directory
+        self._file = KeptFile(run_directory, "memories", "")
         self._kept: dict[str, KeepMemory] = {}
 
     def keep(self, name: str, memory: KeepMemory) -> None:
         """Replace the memory of the component; a write error only loses it for the next placer."""
         self._kept[name] = memory
         try:
-            if (target := self._file(name).target()) is not None:
+            if (target := self._file.of(name).target()) is not None:
                 replace_file(target, msgspec.msgpack.encode(memory), is_lasting=False)
         except OSError as error:
             log.warning("a restart of the placer will not know the memory of %s: %s", name, error)
@@ -44,15 +44,15 @@ class Memories:
     def forget(self, name: str) -> None:
         """Remove the memory of a component that an order has stopped."""
         self._kept.pop(name, None)
-        if (path := self._file(name).path) is not None:
-            path.unlink(missing_ok=True)
-
-    def _file(self, name: str) -> KeptFile:
-        return KeptFile(self._run_directory, "memories", name)
+        try:
+            if (path := self._file.of(name).path) is not None:
+                path.unlink(missing_ok=True)
+        except OSError as error:
+            log.warning("the memory of %s stays: %s", name, error)
 
     def _read(self, name: str) -> KeepMemory | None:
         try:
-            found = self._file(name).read()
+            found = self._file.of(name).read()
             return None if found is None else msgspec.msgpack.decode(found, type=KeepMemory)
         except (OSError, msgspec.DecodeError) as error:
             log.warning("the memory of %s is lost: %s", name, error)

@@ -137,7 +137,8 @@ class Placer(Component[PlacerParameters]):
             case KeepMemory() as memory:
                 return self._keep_memory(component_of(asked.source), memory)
             case AskMemory(order_id=order_id):
-                return Memory(self._memories.of(component_of(asked.source), order_id))
+                name = component_of(asked.source)
+                return Memory(self._memories.of(name, order_id) if self._has_order(name, order_id) else b"")
             case ListPlacements():
                 return Placements([record.placement() for record in self._book.records()], self._book.stopped())
             case other:
@@ -210,10 +211,14 @@ class Placer(Component[PlacerParameters]):
         return admitted.component_type
 
     def _keep_memory(self, name: str, memory: KeepMemory) -> MemoryKept:
-        record = self._book.find(name)
-        if record is not None and record.spawn.order_id == memory.order_id:
+        if self._has_order(name, memory.order_id):
             self._memories.keep(name, memory)
         return MemoryKept()
+
+    def _has_order(self, name: str, order_id: str) -> bool:
+        """Return whether the component of this name is placed under this order."""
+        record = self._book.find(name)
+        return record is not None and record.spawn.order_id == order_id
 
     async def _revise(self, by: ReviseStart) -> StartRevised:
         record = self._book.record(by.name)

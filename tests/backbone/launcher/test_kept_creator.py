@@ -13,7 +13,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import NameTaken
 from backbone.creator.messages import creator_name, offer_name
 from backbone.errors import LinkError
-from backbone.launcher.kept_creator import PREDECESSOR_ENDS_S, KeptCreator, LeftFiles, Offered
+from backbone.launcher.kept_creator import PREDECESSOR_ENDS_S, KeptCreator, LeftFiles, Offered, run_of
 from backbone.naming import Subsystem
 
 BASE = "base"
@@ -55,3 +55,24 @@ def test_a_name_whose_creator_lives_on_is_refused(offered: Callable[[float], Non
 def test_the_creator_of_a_killed_offer_may_end_first(offered: Callable[[float], None]) -> None:
     with pytest.raises(LinkError, match="component_database"):  # the next one that it asks, and that is not here
         offered(PREDECESSOR_ENDS_S / 2)
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_launcher_that_does_not_answer_keeps_no_machine_out(
+    local_mission: Callable[..., Any], beside: Callable[..., Any], *, is_there: bool
+) -> None:
+    """It may be paused; the mission goes on without it."""
+
+    async def main() -> None:
+        async with local_mission() as network:
+            clock, own = VirtualClock(), launch("launcher")
+            launcher = Component[NoParameters](own, network.join(own.address, clock), clock)
+            bus = network.join("backbone/offer-far", clock)
+            if not is_there:
+                assert await run_of(bus) is None
+                await launcher.leave_bus()
+                return
+            async with beside(launcher):
+                assert await run_of(bus) == launcher.component_state().incarnation
+
+    run_virtual(main())

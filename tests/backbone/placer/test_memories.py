@@ -61,5 +61,17 @@ def test_a_memory_that_cannot_be_kept_or_read_is_lost_with_a_warning(
     (tmp_path / "kept" / "memories" / "v").mkdir()
     memories.keep("v", KeepMemory("7", b"one"))
     assert memories.of("v", "7") == b"one"
+    memories.forget("v")
+    assert "the memory of v stays" in caplog.text
     assert "the memory of w is lost" in caplog.text
     assert "a restart of the placer will not know the memory of v" in caplog.text
+
+
+def test_the_placer_of_a_mission_that_has_ended_keeps_nothing_for_the_next_one(tmp_path: Path) -> None:
+    folder = tmp_path / "mission"
+    folder.mkdir()
+    memories = Memories(str(folder))
+    folder.rename(tmp_path / ".mission.ended")
+    folder.mkdir()
+    memories.keep("w", KeepMemory("7", b"of the former mission"))
+    assert list(folder.iterdir()) == []
