@@ -151,7 +151,7 @@ async def test_commands_count_while_a_robot_is_held_and_the_speed_tells_the_robo
     async with page_at(stage) as page:
         assert await page.locator("#commands").is_hidden()
         await take(page)
-        assert await page.locator("#speed-shown").text_content() == "25 % (0.09 m/s)"
+        await page.locator("#speed-shown", has_text="25 % (0.09 m/s)").wait_for()  # its abilities come a moment later
         await page.get_by_role("button", name="Jump").click()
         await wait_until(lambda: given(stage) == [GiveCommand("jump", {}, "scout")], "jumps")
         await page.locator("#release").click()
