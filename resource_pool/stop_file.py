@@ -7,6 +7,7 @@ import logging
 import msgspec
 
 from backbone.atomic_file import replace_file
+from backbone.component.messages import MORE_THAN_ANY_STOP
 from backbone.kept_file import KeptFile
 from resource_pool.stop_messages import StopState
 
@@ -32,7 +33,8 @@ class StopFile:
             return None if saved is None else msgspec.msgpack.decode(saved, type=StopState)
         except (OSError, msgspec.DecodeError) as error:
             log.error("%s: %s", self._file.path, error)
-            return StopState(self._rc, True, 1, "unknown", "the file of an earlier stop cannot be read", 0.0)
+            number, why = MORE_THAN_ANY_STOP, "the file of an earlier stop cannot be read"
+            return StopState(self._rc, True, number, "unknown", why, 0.0)
 
     def write(self, state: StopState) -> None:
         """Replace the saved state, or raise ``OSError``; nothing is saved once the mission has ended."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import msgspec
 
-from backbone.component.messages import StandingStop, Stopper
+from backbone.component.messages import LastStop, StandingStop, Stopper
 from backbone.ranges import MOST_FEW
 from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, StopState
 
@@ -49,25 +49,30 @@ class StopLatch:
         self.state = msgspec.structs.replace(state, number=state.number + 1, also=also)
         return is_new
 
-    def resume(self, stop: StandingStop) -> bool:
-        """Put a stop of the RC's former process in force; return False if a later order is known here."""
-        if stop.number <= self.state.number:
+    def resume(self, last: LastStop) -> bool:
+        """Adopt the last stop of the RC's former process; return False if nothing later than here is known of it."""
+        stop, state = last.standing, self.state
+        if (last.number, stop is None) <= (state.number, not state.is_stopped):
             return False
-        self._began = stop.number
-        (first, *also), rc = stop.authors or [Stopper(stop.by)], self.state.rc
+        self._began = last.number
+        if stop is None:
+            self.state = StopState(state.rc, False, last.number, "an operator", "", state.at_s)
+            return True
+        (first, *also), rc = stop.authors or [Stopper(stop.by)], state.rc
         self.state = StopState(
-            rc, True, stop.number, first.by, stop.reason, stop.since_s, stop.is_confirmed, first.console, also
+            rc, True, last.number, first.by, stop.reason, stop.since_s, stop.is_confirmed, first.console, also
         )
         return True
 
-    def standing(self) -> StandingStop | None:
-        """Return the stop in force with all its authors, for the RC's next process; None: there is none."""
+    def last(self) -> LastStop:
+        """Return the last stop, if it is in force with all its authors, for the RC's next process."""
         state = self.state
         if not state.is_stopped:
-            return None
+            return LastStop(state.number)
         authors = [Stopper(state.by, state.console), *state.also]
         by = ", ".join(dict.fromkeys(author.by for author in authors))
-        return StandingStop(state.number, by, state.reason, state.at_s, state.is_confirmed, authors)
+        standing = StandingStop(state.number, by, state.reason, state.at_s, state.is_confirmed, authors)
+        return LastStop(state.number, standing)
 
     def confirm(self, is_confirmed: bool, number: int | None = None) -> None:
         """If the robot is still stopped, record whether the radio accepted the packet that stops the wheels.

@@ -24,7 +24,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.abilities import NO_ABILITIES, Abilities
 from backbone.component.common_answers import CommonAnswers
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, CommonQuestion, ComponentState, LifeState, LogLevel, StandingStop
+from backbone.component.messages import Absence, CommonQuestion, ComponentState, LastStop, LifeState, LogLevel
 from backbone.component.name_claim import claim_name
 from backbone.component.own_tasks import OwnTasks
 from backbone.component.parameter_values import parameters_from
@@ -174,14 +174,14 @@ class Component(Generic[P_co]):
         """
         return []
 
-    def standing_stop(self) -> StandingStop | None:
-        """Return the emergency stop in force on this component; call ``changed`` when the result changes."""
-        return None
+    def last_stop(self) -> LastStop:
+        """Return the last emergency stop of this component; call ``changed`` when the result changes."""
+        return LastStop()
 
-    def resume_stop(self, stop: StandingStop) -> None:
-        """Take over the emergency stop of the former component of this name, perhaps on another host.
+    def resume_stop(self, last: LastStop) -> None:
+        """Take over the last emergency stop of the former component of this name, perhaps on another host.
 
-        When: before ``connect``, if that component ended while the stop was in force.
+        When: before ``connect``, if that component was ever stopped.
         """
 
     def person(self) -> str:
@@ -282,7 +282,7 @@ class Component(Generic[P_co]):
 
     def component_state(self) -> ComponentState:
         """Return address, process and state of this component."""
-        launch = self.launch
+        launch, last_stop = self.launch, self.last_stop()
         return ComponentState(
             launch.address,
             launch.type,
@@ -293,10 +293,11 @@ class Component(Generic[P_co]):
             self.feedback,
             launch.requester,
             self.absences() if self._state is LifeState.READY else [],
-            self.standing_stop(),
+            last_stop.standing,
             self.person(),
             self.is_robot,
             self.start_number,
+            last_stop.number,
         )
 
     async def run(self) -> None:
@@ -324,8 +325,8 @@ class Component(Generic[P_co]):
         await self.bus.close()
 
     async def _claim_name(self) -> None:
-        if self.registers and (stop := await claim_name(self.bus, self.clock, self.component_state())) is not None:
-            self.resume_stop(stop)
+        if self.registers and (last := await claim_name(self.bus, self.clock, self.component_state())) != LastStop():
+            self.resume_stop(last)
 
     async def _live_and_report_end(self) -> None:
         try:

@@ -100,6 +100,21 @@ class StandingStop(Message, frozen=True):
     authors: Annotated[list[Stopper], FEW] = []
 
 
+MORE_THAN_ANY_STOP = 1_000_000  # chosen: more orders to stop than any mission has, so no host knows a later one
+
+
+class LastStop(Message, frozen=True):
+    """The last emergency stop of a component, for its next process.
+
+    Attributes:
+        number: Number of the last order to stop; 0: it was never stopped.
+        standing: The stop, if it is in force; None: it was lifted.
+    """
+
+    number: Count = 0
+    standing: StandingStop | None = None
+
+
 class ComponentState(Message, frozen=True, tag="ComponentState/2"):
     """Answer to ``AskState``; also published as the component's status on every change.
 
@@ -114,6 +129,7 @@ class ComponentState(Message, frozen=True, tag="ComponentState/2"):
         user: Name of the person at it, as the person gave it; empty: no person.
         is_robot: True for the RC of a robot, which operators can stop.
         start: Random number of this life, see ``incarnation``.
+        stops: Number of the last order to stop it, also if the stop was lifted; 0: it was never stopped.
     """
 
     address: Address
@@ -129,6 +145,7 @@ class ComponentState(Message, frozen=True, tag="ComponentState/2"):
     user: Mention = ""
     is_robot: bool = False
     start: Start = 0
+    stops: Count = 0
 
     @property
     def incarnation(self) -> Incarnation:
@@ -150,10 +167,10 @@ class Registered(Message, frozen=True):
     """Answer to ``Register``: the component holds the name until its liveliness token ends.
 
     Attributes:
-        stop: The emergency stop that was in force on the former component of this name; None: none, or not known.
+        last_stop: The last stop of this component, or of the former one of this name, if it is known.
     """
 
-    stop: StandingStop | None = None
+    last_stop: LastStop = LastStop()
 
 
 class NameTaken(Refusal):

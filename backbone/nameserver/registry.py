@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from backbone.component.messages import ComponentState, LifeState, NameTaken, StandingStop
+from backbone.component.messages import ComponentState, LastStop, LifeState, NameTaken
 from backbone.incarnation import Incarnation
 from backbone.nameserver.messages import Appeared, Components, Disappeared, UnknownName
 from backbone.naming import component_of, did_you_mean
@@ -81,8 +81,8 @@ class Registry:
         reconnect_s: Mission seconds after that in which components of an earlier hub may reconnect; 0 without an
             earlier hub.
         claim_within_s: Mission seconds for which a name is kept until its holder declares its claim.
-        stops: Emergency stops that an earlier hub knew, by the name of the stopped component.
-        otherwise: Stop of each component whose state no hub knows; None: it is not stopped.
+        stops: Last emergency stops that an earlier hub knew, by the name of the component.
+        otherwise: Last stop of each component whose state no hub knows; None: it was never stopped.
     """
 
     def __init__(
@@ -90,14 +90,14 @@ class Registry:
         hub_since_s: float,
         reconnect_s: float,
         claim_within_s: float = CLAIM_WITHIN_S,
-        stops: Mapping[str, StandingStop] | None = None,
-        otherwise: StandingStop | None = None,
+        stops: Mapping[str, LastStop] | None = None,
+        otherwise: LastStop | None = None,
     ) -> None:
         self._claim_within_s = claim_within_s
         self._hub_since_s, self._complete_from_s = hub_since_s, hub_since_s + reconnect_s
         self._entries: dict[str, _Entry] = {}
         self._introducing: set[str] = set()
-        self._stops: dict[str, StandingStop | None] = {**(stops or {})}
+        self._stops: dict[str, LastStop] = {**(stops or {})}
         self._otherwise = otherwise
 
     def registered(self, newcomer: ComponentState, now_s: float) -> None:
@@ -175,13 +175,13 @@ class Registry:
         ):
             self._record(entry, state)
 
-    def stop_of(self, name: str) -> StandingStop | None:
-        """Return the emergency stop in force on the component of this name, or on its last one."""
-        return self._stops.get(name, self._otherwise)
+    def last_stop(self, name: str) -> LastStop:
+        """Return the last emergency stop of the component of this name, or of the former one."""
+        return self._stops.get(name, self._otherwise or LastStop())
 
-    def stops(self) -> dict[str, StandingStop]:
-        """Return the emergency stops in force, by the name of the stopped component."""
-        return {name: stop for name, stop in self._stops.items() if stop is not None}
+    def last_stops(self) -> dict[str, LastStop]:
+        """Return the last emergency stops by the name of the component."""
+        return dict(self._stops)
 
     def is_unknown(self, address: str) -> bool:
         """Return whether a token exists at this address without a known component."""
@@ -227,10 +227,8 @@ class Registry:
 
     def _record(self, entry: _Entry, state: ComponentState) -> None:
         entry.state, name = state, component_of(state.address)
-        if state.stop is None and self._otherwise is None:
-            self._stops.pop(name, None)
-        else:  # kept after its end, because the next one may start on another host
-            self._stops[name] = state.stop
+        if state.stops or self._otherwise is not None:  # kept, because the next one may start on another host
+            self._stops[name] = LastStop(state.stops, state.stop)
 
     def _token_fell(self, name: str, address: str, now_s: float) -> list[Instruction]:
         self._introducing.discard(address)

@@ -157,7 +157,7 @@ class Nameserver(Component[NameserverParameters]):
             raise
         self._registrations += 1
         self.story.note(name, f"registered as {component.address} on {component.host}, pid {component.pid}")
-        return Registered(self._registry.stop_of(name))
+        return Registered(self._registry.last_stop(name))
 
     def _claim_changed(self, claim: str, stands: bool) -> None:
         try:
@@ -180,7 +180,7 @@ class Nameserver(Component[NameserverParameters]):
     def _keep_stops(self) -> None:
         """Save the stops for the next hub; a write error ends no hub."""
         try:
-            self._stops_file.keep(self._registry.stops())
+            self._stops_file.keep(self._registry.last_stops())
         except OSError as error:
             lost = f"a restart of the hub will not know which robots are stopped: {error.strerror}"
             self.publish_event(self.name, lost, LogLevel.WARNING)

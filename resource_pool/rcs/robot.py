@@ -18,7 +18,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.component.messages import StandingStop
+from backbone.component.messages import LastStop
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -104,9 +104,9 @@ class RobotRc(ResourceController[P], Generic[P]):
             say=functools.partial(self.publish_event, self.name),
         )
 
-    def resume_stop(self, stop: StandingStop) -> None:
-        """Stay stopped if the RC's former process was stopped after the last stop that this host knows."""
-        if self._latch.resume(stop):
+    def resume_stop(self, last: LastStop) -> None:
+        """Stay stopped, or not, as the RC's former process, if that one knew of a later stop or lift than this host."""
+        if self._latch.resume(last):
             self._keep_stop()
 
     async def connect(self) -> None:
@@ -301,9 +301,9 @@ class RobotRc(ResourceController[P], Generic[P]):
         except (Refusal, LinkError) as error:  # the next motion of the wheels replaces the stop packet
             self.story.note(holder.arc, f"the stop packet is still repeated: {error}")
 
-    def standing_stop(self) -> StandingStop | None:
-        """Return the stop in force, for the published state."""
-        return self._latch.standing()
+    def last_stop(self) -> LastStop:
+        """Return the last stop, for the published state."""
+        return self._latch.last()
 
     def _tell_halted(self, hold: Hold) -> None:
         """Publish that the robot was halted without a command."""

@@ -55,7 +55,7 @@ def test_a_stop_outlives_the_process_of_the_robots_rc(local_mission: Any, beside
 
 
 def test_a_stop_stays_in_force_on_another_host(local_mission: Any, beside: Any, tmp_path: Path) -> None:
-    """Host b was the robot's before, and knows an older stop that was lifted there."""
+    """Host b knows an older stop, which was lifted there, and host a a later one, which was lifted on host b."""
 
     async def main() -> None:
         async with a_pool(local_mission, ["radio"]) as pool:
@@ -76,8 +76,10 @@ def test_a_stop_stays_in_force_on_another_host(local_mission: Any, beside: Any, 
                 assert state == stop, "with both authors and their consoles"
                 await lift_stop(operator, state)
                 await pool.clock.sleep_s(0.1)
-            async with beside(scout(scout_launch(tmp_path / "c"))):
-                assert not (await ask_stop(operator, "scout1")).is_stopped
+            for launch in (scout_launch(tmp_path / "c"), here):
+                async with beside(scout(launch)):
+                    free = await ask_stop(operator, "scout1")
+                    assert (free.is_stopped, free.number) == (False, state.number)
 
     run_virtual(main())
 

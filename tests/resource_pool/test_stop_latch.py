@@ -70,11 +70,29 @@ def test_an_rc_on_another_host_knows_every_author_of_the_stop_that_it_resumes() 
     latch, elsewhere = StopLatch("scout1"), StopLatch("scout1")
     latch.stop("anna", "fire", 1.0, "ui_console/a")
     latch.stop("ben", "", 2.0, "ui_console/b")
-    standing = latch.standing()
-    assert standing is not None
-    assert standing.by == "anna, ben"
-    assert elsewhere.resume(standing)
+    last = latch.last()
+    assert last.standing is not None
+    assert last.standing.by == "anna, ben"
+    assert elsewhere.resume(last)
     assert elsewhere.state == latch.state
+
+
+@given(st.lists(st.sampled_from(["stop", "lift", "move to a", "move to b", "move to c"]), max_size=30))
+def test_on_whichever_host_its_rc_starts_a_robot_is_stopped_or_free_as_it_was(happens: list[str]) -> None:
+    """Each host has a file of its own, which knows nothing of stops and lifts elsewhere."""
+    one, moved = StopLatch("scout1"), StopLatch("scout1")
+    files: dict[str, StopState] = {}
+    host = "a"
+    for happened in happens:
+        if happened == "stop":
+            assert one.stop("anna", "fire", 1.0) == moved.stop("anna", "fire", 1.0)
+        elif happened == "lift":
+            assert one.lift(one.state.number, "anna", 2.0) == moved.lift(moved.state.number, "anna", 2.0)
+        else:
+            files[host], last, host = moved.state, moved.last(), happened
+            moved = StopLatch("scout1", files.get(host))
+            moved.resume(last)
+        assert moved.last() == one.last()
 
 
 def test_a_lift_of_what_was_seen_before_somebody_else_stopped_too_lifts_nothing() -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.component.messages import ComponentState, LifeState, NameTaken, StandingStop
+from backbone.component.messages import ComponentState, LastStop, LifeState, NameTaken, StandingStop
 from backbone.errors import Refusal
 from backbone.incarnation import Incarnation
 from backbone.nameserver.messages import Appeared, Disappeared, UnknownName
@@ -197,19 +197,19 @@ def test_what_is_said_about_readiness_counts_only_under_a_token() -> None:
 
 
 @pytest.mark.parametrize("how", ["published", "introduced"])
-def test_the_stop_of_the_last_component_of_a_name_is_kept_until_it_is_lifted(how: str) -> None:
+def test_the_stop_of_the_last_component_of_a_name_is_kept_and_whether_it_was_lifted(how: str) -> None:
     registry, stop = Registry(0.0, 0.0), StandingStop(3, "anna", "fire", 1.0)
     tell = {"published": registry.status_published, "introduced": registry.introduced}[how]
     first, second = state(), state(pid=2, host="b")
     begun(registry, first)
     registry.token_changed(first.address, stands=True, now_s=1.0)
-    tell(msgspec.structs.replace(first, stop=stop))
+    tell(msgspec.structs.replace(first, stop=stop, stops=3))
     gone(registry, first)
     begun(registry, second)
-    assert (registry.stop_of("scout1"), registry.stop_of("scout2")) == (stop, None)
+    assert (registry.last_stop("scout1"), registry.last_stop("scout2")) == (LastStop(3, stop), LastStop())
     registry.token_changed(second.address, stands=True, now_s=2.0)
-    tell(second)
-    assert registry.stop_of("scout1") is None
+    tell(msgspec.structs.replace(second, stops=3))
+    assert registry.last_stop("scout1") == LastStop(3)
 
 
 def test_a_restarted_hub_learns_who_is_behind_the_tokens_that_come_back() -> None:

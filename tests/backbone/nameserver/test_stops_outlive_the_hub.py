@@ -10,33 +10,33 @@ from test_nameserver_service import Probe, nameserver, probe
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.messages import StandingStop
+from backbone.component.messages import LastStop, StandingStop
 from backbone.nameserver.stops_file import FILE_NAME
 
-FIRE = StandingStop(3, "anna", "fire", 1.0)
+FIRE, LIFTED = LastStop(3, StandingStop(3, "anna", "fire", 1.0)), LastStop(3)
 
 
 class Stoppable(Probe):
     """A component that an operator has stopped, and that takes over the stop of its former process."""
 
-    stop: StandingStop | None = None
+    stop = LastStop()
 
-    def standing_stop(self) -> StandingStop | None:
+    def last_stop(self) -> LastStop:
         return self.stop
 
-    def resume_stop(self, stop: StandingStop) -> None:
-        self.stop = stop
+    def resume_stop(self, last: LastStop) -> None:
+        self.stop = last
 
 
-async def _stop_of_the_next(network: LocalNetwork, beside: Any, name: str = "scout1") -> StandingStop | None:
+async def _stop_of_the_next(network: LocalNetwork, beside: Any, name: str = "scout1") -> LastStop:
     """Return the stop that the next component of this name takes over, on another host."""
     second = probe(network, name, Stoppable, host="b")
     async with beside(second):
         await VirtualClock().sleep_s(2.0)
-        return second.standing_stop()
+        return second.last_stop()
 
 
-async def _stopped_and_gone(network: LocalNetwork, beside: Any, *then: StandingStop | None) -> None:
+async def _stopped_and_gone(network: LocalNetwork, beside: Any, *then: LastStop) -> None:
     """Run a component that is stopped, then has these stops, then ends."""
     first = probe(network, kind=Stoppable)
     first.stop = FIRE
@@ -48,9 +48,9 @@ async def _stopped_and_gone(network: LocalNetwork, beside: Any, *then: StandingS
         await VirtualClock().sleep_s(1.0)
 
 
-@pytest.mark.parametrize(("then", "taken_over"), [((), FIRE), ((None,), None)], ids=["stopped", "lifted"])
+@pytest.mark.parametrize(("then", "taken_over"), [((), FIRE), ((LIFTED,), LIFTED)], ids=["stopped", "lifted"])
 def test_a_restarted_hub_still_knows_the_stop_of_a_robot_whose_rc_is_down(
-    tmp_path: Path, beside: Any, then: tuple[None, ...], taken_over: StandingStop | None
+    tmp_path: Path, beside: Any, then: tuple[LastStop, ...], taken_over: LastStop
 ) -> None:
     async def main() -> None:
         network = LocalNetwork()
@@ -70,15 +70,15 @@ def test_if_the_file_of_stops_cannot_be_read_each_robot_that_registers_anew_is_s
     async def main() -> None:
         network = LocalNetwork()
         async with beside(nameserver(network, str(tmp_path))):
-            stop = await _stop_of_the_next(network, beside)
+            stop = (await _stop_of_the_next(network, beside)).standing
             assert stop is not None
             assert "cannot be read" in stop.reason
             free = probe(network, "scout2", Stoppable)
             async with beside(free):
-                free.stop = None
+                free.stop = LastStop()
                 free.changed()
                 await VirtualClock().sleep_s(1.0)
-            assert await _stop_of_the_next(network, beside, "scout2") is None, "it was seen free since"
+            assert await _stop_of_the_next(network, beside, "scout2") == LastStop(), "it was seen free since"
 
     run_virtual(main())
 

@@ -100,6 +100,7 @@ export interface ComponentState {
   user: string;
   is_robot: boolean;
   start: number;
+  stops: number;
 }
 
 export interface ConsentView {
