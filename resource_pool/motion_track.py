@@ -8,7 +8,7 @@ Rules of this file:
   before them, and adds them and all events since in the order of their times.
 * If no RC has the motions of some time, the spread grows by the ways and turns that are likely in that time. If an RC
   has no record of its former process, this is the time from the last motion until that process left. A robot that was
-  at rest before does not move in it.
+  at rest before does not move in it. The time ends sooner if the robot's radio took no more packets that move it.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ import msgspec
 
 from resource_pool.commands import Halt, Jump
 from resource_pool.dead_reckoning import Belief, DeadReckoning, Motion
-from resource_pool.messages import Applied
+from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, LastMove
 from resource_pool.published_motions import Motions
 
 UNSEEN_M_S = 0.2  # chosen: standard deviation of a speed of up to 0.35 m/s forward or backward
 UNSEEN_RAD_S = 0.9  # chosen: same, of up to 1.5 rad/s
 AT_REST_S = 3.0  # chosen: a driven robot has motions ten times a second, and a cut is seen after 2 s
+SAME_S = 0.02  # chosen: a radio takes a packet some ms before its motion counts, and clocks of hosts differ
 EVENTS_KEPT = 1000  # chosen: a minute of motions and sightings
 
 Event = Callable[[DeadReckoning], None]
@@ -131,7 +132,9 @@ class MotionTrack:
         if lost and lost[0].number > number + 1:
             unseen_until_s = lost[0].at_s
         else:
-            unseen_until_s = self._last_s if is_same else min(told.begun_s, self._left_s)
+            unseen_until_s = (
+                self._last_s if is_same else min(told.begun_s, self._left_s, self._moved_until_s(told.before))
+            )
         self._again(lost, unseen_until_s)
 
     def give_up(self) -> None:
@@ -160,6 +163,14 @@ class MotionTrack:
         for motion in waiting:
             if motion.at_s >= self._last_s:
                 self.moved(motion)
+
+    def _moved_until_s(self, before: LastMove | None) -> float:
+        """Return until when a motion that was not heard may have moved the robot, as its radio knows it."""
+        if before is None or before.since_s > self._last_s:
+            return math.inf
+        if before.at_s is None or before.at_s <= self._last_s + SAME_S:
+            return self._last_s
+        return before.at_s + 2 * COMMAND_TIMEOUT_S  # repeated by the radio, and obeyed, for so long each
 
     def _unseen_until(self, at_s: float) -> None:
         unseen_s = at_s - self._last_s

@@ -23,6 +23,7 @@ import logging
 import math
 from collections import deque
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import msgspec
 
@@ -30,19 +31,22 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
+from backbone.exchange import SwapClass
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address, component_of
 from backbone.ranges import MOST_PAYLOAD_BYTES
-from backbone.rc_manager.messages import LONGEST_PACKET_S, RcState, StaleEpoch
+from backbone.rc_manager.messages import LONGEST_PACKET_S, AskRc, Connect, Disconnect, RcState, StaleEpoch
 from backbone.waiting import set_within
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.drivers.interface import HardwareFault, RadioDriver, open_device
 from resource_pool.holds import Hold
 from resource_pool.link_watch import LinkNews, LinkWatch
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     DEFAULT_DRIVE_USAGE,
+    AskLastMove,
     ImpossibleUse,
+    LastMove,
     LoadPacket,
     NoTurnSoon,
     PacketLoaded,
@@ -72,6 +76,7 @@ class CommandRadio(ResourceController[RcParameters]):
     """Interleaves packets by network id; when an ARC is disconnected, its robots get a last, safe packet."""
 
     commands = LoadPacket
+    accepts: ClassVar[Accepts | None] = Connect | Disconnect | AskRc | SwapClass | LoadPacket | AskLastMove
     driver_kind, driver_protocol = "radio", RadioDriver
     outlasts_s = COMMAND_TIMEOUT_S  # robots without packets stop and switch off after this time
 
@@ -91,6 +96,7 @@ class CommandRadio(ResourceController[RcParameters]):
         self._worst_packet_s = self._on_air_s = 0.0
         self._links = LinkWatch()
         self._heard_robots: set[int] = set()
+        self._moved_s: dict[int, float] = {}
 
     async def connect(self) -> None:
         """Open the device."""
@@ -132,6 +138,12 @@ class CommandRadio(ResourceController[RcParameters]):
                 await self._transmit(self._owed[0])
                 self._owed.popleft()
 
+    async def answer(self, asked: Envelope[Message]) -> Message:
+        """Also answer when a robot was moved last, for its next RC."""
+        if isinstance(asked.body, AskLastMove):
+            return LastMove(self._born_s, self._moved_s.get(asked.body.network_id))
+        return await super().answer(asked)
+
     async def command(self, asked: Envelope[Message]) -> Message:
         """Load a packet, or send it once and soon."""
         order = asked.body
@@ -145,6 +157,8 @@ class CommandRadio(ResourceController[RcParameters]):
         if self._schedule.is_overtaken(packet):
             self.applied -= 1
             raise self._overtaken(packet)
+        if order.moves:
+            self._moved_s[order.network_id] = now_s
         for ticket in self._schedule.hear_stop(packet):
             self._settle(self._waiting.get(ticket), self._overtaken(packet))
         if order.at_once:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import logging
 from collections.abc import Mapping
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
@@ -37,8 +36,6 @@ from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop, EmergencyQuestion, EmergencyStop, GivenBeforeStop, LiftStop, StopState
 
 __all__ = ["RobotParameters", "RobotRc"]
-
-log = logging.getLogger(__name__)
 
 OPERATORS = (f"{Subsystem.UI_CONSOLE}/", f"{Subsystem.BACKBONE}/")
 """Subsystems whose components may stop any robot without a grant, because they act for people."""
@@ -113,7 +110,9 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Also subscribe to the robot's replies."""
         await super().connect()
         if self._radio:
-            self._reports.listen(address(Subsystem.RESOURCE_POOL, self._radio), self.parameters.network_id)
+            radio, network_id = address(Subsystem.RESOURCE_POOL, self._radio), self.parameters.network_id
+            self._reports.listen(radio, network_id)
+            await self._motions.ask_before(radio, network_id, RADIO_REPLY_S)
 
     async def serve(self) -> None:
         """Stop the wheels when no command comes, and end the hold when its lease expires."""

@@ -9,7 +9,8 @@ import pytest
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.local_bus import LocalNetwork
-from resource_pool.messages import Applied
+from backbone.wire import Envelope, Message
+from resource_pool.messages import Applied, AskLastMove, LastMove
 from resource_pool.published_motions import KEPT, PublishedMotions
 
 
@@ -34,6 +35,33 @@ def test_motions_are_numbered_from_1_and_asked_for_by_time() -> None:
     assert numbers(published) == [1, 2, 3, 4]
     assert numbers(published, 8.0) == [3, 4]
     assert published.since(0.0).begun_s == 5.0
+
+
+@pytest.mark.parametrize(
+    ("moved_s", "is_kept"), [(None, True), (7.9, True), (8.1, False)], ids=["not since", "one is missing", "elsewhere"]
+)
+async def test_a_record_of_this_host_ends_if_the_robot_moved_elsewhere_since(
+    tmp_path: Path, moved_s: float | None, is_kept: bool
+) -> None:
+    process(tmp_path, 5.0).publish(motion(7.0))
+    network, clock = LocalNetwork(), MissionClock.started_now()
+    bus, radio = (network.join(f"resource_pool/{name}", clock) for name in ("scout1", "radio"))
+    nxt = PublishedMotions(bus, 20.0, str(tmp_path))
+    await nxt.ask_before(radio.source, 1, within_s=1)
+    assert nxt.since(0.0).begun_s == 5.0, "no radio answers"
+    told = LastMove(1.0, moved_s)
+
+    async def answer(asked: Envelope[Message]) -> Message:
+        assert asked.body == AskLastMove(1)
+        return told
+
+    radio.serve(radio.source, AskLastMove, answer)
+    await nxt.ask_before(radio.source, 1, within_s=1)
+    motions = nxt.since(0.0)
+    assert (motions.begun_s, motions.before) == ((5.0, None) if is_kept else (20.0, told))
+    nxt.publish(motion(21.0))
+    assert numbers(nxt) == ([1, 2] if is_kept else [1])
+    assert numbers(process(tmp_path, 30.0)) == numbers(nxt)
 
 
 @pytest.mark.parametrize("count", [1, 2, KEPT, KEPT + 1, 2 * KEPT + 2, 5 * KEPT])

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resource_pool.dead_reckoning import STILL, Belief, DeadReckoning, FloorPose
-from resource_pool.messages import Applied
+from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, LastMove
 from resource_pool.motion_track import UNSEEN_M_S, UNSEEN_RAD_S, Known, MotionTrack
 from resource_pool.published_motions import Motions
 
@@ -195,6 +195,28 @@ def test_the_unknown_time_ends_when_the_former_process_left(left_s: float, unsee
         track.recover(Motions(40.0, lost))
         assert not track.has_gap
         assert track.believe(42.0).spread_m == pytest.approx(math.hypot(0.02, UNSEEN_M_S * unseen_s))
+
+
+@pytest.mark.parametrize(
+    ("before", "unseen_s"),
+    [
+        (LastMove(5.0, 11.0), 0.0),
+        (LastMove(5.0), 0.0),
+        (LastMove(5.0, 11.1), 0.1 + 2 * COMMAND_TIMEOUT_S),
+        (LastMove(5.0, 12.9), 2.0),
+        (LastMove(11.5), 2.0),
+        (None, 2.0),
+    ],
+    ids=["the last motion was heard", "none", "one was not heard", "long after", "the radio is new", "not known"],
+)
+def test_the_unknown_time_ends_with_the_last_packet_that_moves_it(before: LastMove | None, unseen_s: float) -> None:
+    track = MotionTrack(msgspec.structs.replace(BEGIN, number=8))
+    track.moved(moving(9, 11.0, 0.0))
+    track.rc_left(13.0)
+    track.recover(Motions(40.0, [], before))
+    assert track.believe(42.0).spread_m == pytest.approx(math.hypot(0.02, UNSEEN_M_S * unseen_s))
+    track.moved(moving(1, 43.0, 0.0))
+    assert not track.has_gap
 
 
 def test_one_whose_link_was_cut_does_not_know_when_the_former_process_left() -> None:

@@ -15,7 +15,7 @@ from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, Leases, StaleEpoch
 from backbone.scheduling.requests import Lease, RcUse, Usage
-from resource_pool.messages import LoadPacket, NoTurnSoon, PacketLoaded
+from resource_pool.messages import AskLastMove, LastMove, LoadPacket, NoTurnSoon, PacketLoaded
 
 RADIO = "resource_pool/radio"
 DRIVE, ASK = Usage(0.05, 0.002, kind="drive"), Usage(0.2, 0.002, kind="ask")
@@ -48,6 +48,29 @@ def radio_log(pool: Pool) -> list[tuple[str, str]]:
 
 async def statistics(pool: Pool) -> dict[str, float]:
     return (await pool.ear.ask(RADIO, AskStatistics(), Statistics, within_s=1)).values
+
+
+def test_it_knows_when_it_last_took_a_packet_that_moves_a_robot(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"], manager=False) as pool:
+
+            async def moved(network_id: int) -> LastMove:
+                return await pool.ear.ask(RADIO, AskLastMove(network_id), LastMove, within_s=1)
+
+            await connect(pool, "one", 1, DRIVE)
+            await pool.clock.sleep_s(1.0)
+            await load(pool, "one", 1, b"H")
+            assert (await moved(1)).at_s is None
+            before_s = pool.clock.now_s()
+            await load(pool, "one", 1, b"D", moves=True)
+            await pool.clock.sleep_s(1.0)
+            await load(pool, "one", 1, b"H")
+            told, other = await moved(1), await moved(2)
+            assert told.at_s == pytest.approx(before_s, abs=0.1)
+            assert (other.at_s, other.since_s) == (None, told.since_s)
+            assert told.since_s < before_s
+
+    run_virtual(main())
 
 
 def test_each_kind_of_request_is_sent_at_its_own_constant_interval(local_mission: Any) -> None:

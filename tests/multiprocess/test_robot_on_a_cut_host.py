@@ -1,0 +1,94 @@
+"""A robot whose RC runs on a machine that is cut off is at a known place when its next RC runs on another one."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import re
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+from namespaces import NetworkHost
+from test_go_to_mission import GO_TO
+from three_hosts import NAME, ThreeHosts, mission_on_three_hosts
+
+from backbone.errors import LinkError
+from resource_pool.localization import AskPose, Pose
+
+pytestmark = [pytest.mark.processes, pytest.mark.thorough, pytest.mark.timeout(240)]
+
+ROBOT, WORLD, LOCALIZER = "scout1", "world", "localizer"
+FIELD = """<types><type name="scout" class="resource_pool.rcs.scout:Scout" subsystem="resource_pool"
+uses="command_radio" tags="field"/></types>"""
+TAGS = {"base": "indoors", "near": "field", "far": "field"}
+OTHERS = 6  # they keep the behaviors off the machines that are cut
+KNOWN_M = 0.3  # chosen: a time of 2 s without motions is a spread of 0.4 m
+
+
+def robots_in_the_field(hosts: dict[str, NetworkHost]) -> str:
+    """Return ``go-to.xml`` for three machines: the robots' RCs on near or far, all other resources on base."""
+    text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{NAME}", GO_TO.read_text(encoding="utf-8"), count=1)
+    machines = "".join(
+        f'<host name="{name}" address="{host.address}" tags="{TAGS[name]}"/>' for name, host in hosts.items()
+    )
+    more = "".join(
+        f'<resource type="localizer" name="other{number}-{host}" host="{host}"/>'
+        for number in range(OTHERS)
+        for host in ("near", "far")
+    )
+    text = re.sub(r'(type="scout" name="\w+") process="hardware"', r"\1", text)
+    for before, after in [
+        (' process="hardware"', ' host="base"'),
+        ('<world seed="1">', '<world seed="1" host="base">'),
+        ("<resources>", f"{FIELD}<hosts>{machines}</hosts><resources>"),
+        ("</resources>", f"{more}</resources>"),
+    ]:
+        text = text.replace(before, after)
+    return text
+
+
+async def pose(mission: ThreeHosts, source: str) -> Pose | None:
+    """Return the robot's pose; None: the source does not answer."""
+    async with mission.bus() as bus:
+        try:
+            return await bus.ask(f"resource_pool/{source}", AskPose(ROBOT), Pose, within_s=1)
+        except LinkError:
+            return None
+
+
+def test_it_is_at_a_known_place_there_and_when_its_rc_is_back(short_path: Path) -> None:
+    """It was at an unknown place, and its behavior failed: all the time until the cut was seen counted as unknown."""
+
+    def host() -> str:
+        found = mission.components().get(ROBOT)
+        return found.host if found is not None and found.state == "ready" else ""
+
+    def is_at(hosts: set[str]) -> bool:
+        return host() in hosts
+
+    def drives() -> bool:
+        first = asyncio.run(pose(mission, WORLD))
+        time.sleep(0.5)
+        then = asyncio.run(pose(mission, WORLD))
+        if first is None or then is None:
+            return False
+        return math.dist((first.x_m, first.y_m), (then.x_m, then.y_m)) > 0.03
+
+    with mission_on_three_hosts(short_path, text=robots_in_the_field, arcs={"go-out-drive"}) as mission:
+        for _ in range(2):
+            mission.wait("the robot drives", drives, 60.0)
+            here = host()
+            others = {"near", "far"} - {here}
+            assert len(others) == 1
+            mission.hosts[here].cut()
+            mission.wait("its RC is elsewhere", partial(is_at, others), 60.0)
+            mission.wait("it drives again", drives, 60.0)
+            believed, true = (asyncio.run(pose(mission, source)) for source in (LOCALIZER, WORLD))
+            assert believed is not None
+            assert true is not None
+            apart_m = math.dist((believed.x_m, believed.y_m), (true.x_m, true.y_m))
+            assert max(apart_m, believed.spread_m) < KNOWN_M, mission.story()
+            mission.hosts[here].heal()
+            mission.wait("all is back", mission.is_whole, 60.0)
