@@ -96,7 +96,7 @@ class ResourceController(Component[R], Generic[R]):
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        if cls.commands is not None and "accepts" not in vars(cls):
+        if cls.commands is not None and "commands" in vars(cls) and "accepts" not in vars(cls):
             cls.accepts = Connect | Disconnect | AskRc | SwapClass | cls.commands
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

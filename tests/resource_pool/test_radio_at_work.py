@@ -16,6 +16,7 @@ from backbone.keys import Conversation
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, Leases, StaleEpoch
 from backbone.scheduling.requests import Lease, RcUse, Usage
 from resource_pool.messages import AskLastMove, LastMove, LoadPacket, NoTurnSoon, PacketLoaded
+from resource_pool.rcs.command_radio import CommandRadio
 
 RADIO = "resource_pool/radio"
 DRIVE, ASK = Usage(0.05, 0.002, kind="drive"), Usage(0.2, 0.002, kind="ask")
@@ -71,6 +72,13 @@ def test_it_knows_when_it_last_took_a_packet_that_moves_a_robot(local_mission: A
             assert told.since_s < before_s
 
     run_virtual(main())
+
+
+def test_a_radio_of_ones_own_answers_the_same_questions() -> None:
+    class OwnRadio(CommandRadio):
+        pass
+
+    assert OwnRadio.accepts == CommandRadio.accepts
 
 
 def test_each_kind_of_request_is_sent_at_its_own_constant_interval(local_mission: Any) -> None:
