@@ -38,6 +38,7 @@ from backbone.rc_manager.messages import AskSchedule, TraceLine
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
+from backbone.waiting import set_within
 from backbone.wire import Envelope
 
 EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
@@ -45,6 +46,7 @@ PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start takes less
 SAME_EVERY_S = 60.0  # chosen: a wait for a person at another machine may last hours
 REPLY_TIME_S = 2.0  # chosen: the RC manager answers in milliseconds
 SWITCH_S = 0.1  # chosen: the decisions of one switch become one line; a person sees no delay
+SUBSCRIBED_S = 1.0  # chosen: the answer may be here before the RC manager knows the subscriber, some ms later
 AT_ONCE = 10  # chosen: with more requests the line is longer and changes more often than a person can read
 ENDS_WITHIN_S = 1.0  # chosen: a terminal that reads takes the last lines at once
 REDRAW_EVERY_S = 0.5  # chosen: slices of seconds stay visible; a faster picture takes a core that the mission needs
@@ -183,6 +185,7 @@ class ConsoleObserver:
         more seldom it asks.
         """
         decided, requests = asyncio.Event(), 0
+        look_within_s: float | None = SUBSCRIBED_S
         bus.subscribe(RC_MANAGER, Conversation.EVENTS, TraceLine, lambda _line: decided.set())
         try:
             while True:
@@ -191,7 +194,8 @@ class ConsoleObserver:
                     schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
                     requests = len(schedule.requests)
                     self._tell_changed(schedule)
-                await decided.wait()
+                await set_within(decided, look_within_s)
+                look_within_s = None
                 await clock.sleep_s(SWITCH_S * max(1.0, requests / AT_ONCE) * clock.rate)
         finally:
             with contextlib.suppress(RuntimeError):  # the bus is closed already

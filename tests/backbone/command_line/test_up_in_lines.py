@@ -109,3 +109,25 @@ def test_the_more_requests_there_are_the_more_seldom_their_holders_are_asked_for
 
     run_virtual(scene())
     assert most / 2 <= len(asked) <= most
+
+
+def test_a_decision_before_the_manager_knew_its_subscriber_is_shown_all_the_same() -> None:
+    """The first holder was never shown, if no further decision followed."""
+    lines = io.StringIO()
+
+    async def scene() -> None:
+        clock, network = VirtualClock(), LocalNetwork("lines")
+        manager, up = network.join(RC_MANAGER, clock), network.join("backbone/launcher", clock)
+        held = RequestView("patrol-drive", "", RequestState.RUNNING, ["radio"], 0.0, 0.0, -1.0, "", [], 1.0, "", 0)
+
+        async def answer(_asked: Envelope[Message]) -> Message:
+            return Schedule(clock.now_s(), [], [held] if clock.now_s() > 0.5 else [], [])
+
+        manager.serve(RC_MANAGER, AskSchedule, answer)
+        showing = asyncio.create_task(ConsoleObserver(Console(file=lines), live=False).up(up, clock))
+        await clock.sleep_s(3.0)
+        await end_tasks(showing)
+
+    run_virtual(scene())
+    assert "no ARC has a request" in lines.getvalue()
+    assert "runs: patrol-drive" in lines.getvalue()
