@@ -253,24 +253,6 @@ class PacketLoaded(Message, frozen=True):
     """Answer to ``LoadPacket``: the packet is loaded; with ``at_once``, it is sent."""
 
 
-class AskLastMove(Message, frozen=True):
-    """Ask a radio when it last took a packet that moves this robot. The robot's RC asks this when it begins."""
-
-    network_id: Count
-
-
-class LastMove(Message, frozen=True):
-    """Answer to ``AskLastMove``.
-
-    Attributes:
-        since_s: Mission time at which the radio's process began; it knows no earlier packet.
-        at_s: Mission time of the last packet that moves the robot; None: there was none since then.
-    """
-
-    since_s: Instant
-    at_s: Instant | None = None
-
-
 class Reply(Message, frozen=True):
     """A robot's reply, published under the address of the radio that received it.
 

@@ -21,8 +21,8 @@ import msgspec
 
 from resource_pool.commands import Halt, Jump
 from resource_pool.dead_reckoning import Belief, DeadReckoning, Motion
-from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, LastMove
-from resource_pool.published_motions import Motions
+from resource_pool.messages import COMMAND_TIMEOUT_S, Applied
+from resource_pool.published_motions import LastMove, Motions
 
 UNSEEN_M_S = 0.2  # chosen: standard deviation of a speed of up to 0.35 m/s forward or backward
 UNSEEN_RAD_S = 0.9  # chosen: same, of up to 1.5 rad/s

@@ -12,15 +12,33 @@ from backbone.bus.interface import Bus
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import component_of
-from backbone.ranges import MANY, Instant
+from backbone.ranges import MANY, Count, Instant
 from backbone.wire import Message
-from resource_pool.messages import Applied, AskLastMove, LastMove
+from resource_pool.messages import Applied
 from resource_pool.motion_file import MotionFile
 
 KEPT = 300  # chosen: half a minute of driving, longer than a localizer's restart or a cut of the network
 ELSEWHERE_S = 1.0  # chosen: a killed RC misses one motion; an RC elsewhere begins when a cut is seen, after 2 s
 
 log = logging.getLogger(__name__)
+
+
+class AskLastMove(Message, frozen=True):
+    """Ask a radio when it last took a packet that moves this robot. The robot's RC asks this when it begins."""
+
+    network_id: Count
+
+
+class LastMove(Message, frozen=True):
+    """Answer to ``AskLastMove``.
+
+    Attributes:
+        since_s: Mission time at which the radio's process began; it knows no earlier packet.
+        at_s: Mission time of the last packet that moves the robot; None: there was none since then.
+    """
+
+    since_s: Instant
+    at_s: Instant | None = None
 
 
 class AskMotions(Message, frozen=True):

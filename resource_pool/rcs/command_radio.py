@@ -44,15 +44,14 @@ from resource_pool.link_watch import LinkNews, LinkWatch
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     DEFAULT_DRIVE_USAGE,
-    AskLastMove,
     ImpossibleUse,
-    LastMove,
     LoadPacket,
     NoTurnSoon,
     PacketLoaded,
     Reply,
 )
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
+from resource_pool.published_motions import AskLastMove, LastMove
 from resource_pool.resource_controller import RcParameters, ResourceController
 from resource_pool.returned_numbers import number_between
 from resource_pool.slow_packets import EVERY_S, SlowPackets

@@ -10,8 +10,8 @@ import pytest
 from backbone.bus.clock import MissionClock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.wire import Envelope, Message
-from resource_pool.messages import Applied, AskLastMove, LastMove
-from resource_pool.published_motions import KEPT, PublishedMotions
+from resource_pool.messages import Applied
+from resource_pool.published_motions import KEPT, AskLastMove, LastMove, PublishedMotions
 
 
 def motion(at_s: float) -> Applied:

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resource_pool.dead_reckoning import STILL, Belief, DeadReckoning, FloorPose
-from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, LastMove
+from resource_pool.messages import COMMAND_TIMEOUT_S, Applied
 from resource_pool.motion_track import UNSEEN_M_S, UNSEEN_RAD_S, Known, MotionTrack
-from resource_pool.published_motions import Motions
+from resource_pool.published_motions import LastMove, Motions
 
 BEGIN_S = 10.0
 BEGIN = Known(Belief(FloorPose(1.0, 2.0, 0.5), BEGIN_S, 0.02, 0.03), STILL, 0, BEGIN_S)

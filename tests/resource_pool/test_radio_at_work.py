@@ -15,7 +15,8 @@ from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, Leases, StaleEpoch
 from backbone.scheduling.requests import Lease, RcUse, Usage
-from resource_pool.messages import AskLastMove, LastMove, LoadPacket, NoTurnSoon, PacketLoaded
+from resource_pool.messages import LoadPacket, NoTurnSoon, PacketLoaded
+from resource_pool.published_motions import AskLastMove, LastMove
 from resource_pool.rcs.command_radio import CommandRadio
 
 RADIO = "resource_pool/radio"
