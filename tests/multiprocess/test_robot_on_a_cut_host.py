@@ -28,7 +28,7 @@ KNOWN_M = 0.3  # chosen: a time of 2 s without motions is a spread of 0.4 m
 
 
 def robots_in_the_field(hosts: dict[str, NetworkHost]) -> str:
-    """Return ``go-to.xml`` for three machines: the robots' RCs on near or far, all other resources on base."""
+    """Return ``go-to.xml`` for three machines: RCs of robots on near or far, other resources on base, and a patrol."""
     text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{NAME}", GO_TO.read_text(encoding="utf-8"), count=1)
     machines = "".join(
         f'<host name="{name}" address="{host.address}" tags="{TAGS[name]}"/>' for name, host in hosts.items()
@@ -44,6 +44,9 @@ def robots_in_the_field(hosts: dict[str, NetworkHost]) -> str:
         ('<world seed="1">', '<world seed="1" host="base">'),
         ("<resources>", f"{FIELD}<hosts>{machines}</hosts><resources>"),
         ("</resources>", f"{more}</resources>"),
+        ('type="go_to" name="go-out"', 'type="patrol" name="go-out"'),
+        ('<parameter name="x_m" value="3"/>', '<parameter name="waypoints" value="3,2 1,1"/>'),
+        ('<parameter name="y_m" value="2"/>', ""),
     ]:
         text = text.replace(before, after)
     return text
@@ -68,6 +71,9 @@ def test_it_is_at_a_known_place_there_and_when_its_rc_is_back(short_path: Path) 
     def is_at(hosts: set[str]) -> bool:
         return host() in hosts
 
+    def has_creator(name: str) -> bool:
+        return f"creator-{name}" in mission.components()
+
     def drives() -> bool:
         first = asyncio.run(pose(mission, WORLD))
         time.sleep(0.5)
@@ -91,4 +97,4 @@ def test_it_is_at_a_known_place_there_and_when_its_rc_is_back(short_path: Path) 
             apart_m = math.dist((believed.x_m, believed.y_m), (true.x_m, true.y_m))
             assert max(apart_m, believed.spread_m) < KNOWN_M, mission.story()
             mission.hosts[here].heal()
-            mission.wait("all is back", mission.is_whole, 60.0)
+            mission.wait("the machine is back", partial(has_creator, here), 60.0)
