@@ -97,6 +97,8 @@ class Registry:
         self._hub_since_s, self._complete_from_s = hub_since_s, hub_since_s + reconnect_s
         self._entries: dict[str, _Entry] = {}
         self._introducing: set[str] = set()
+        self._follows_another = reconnect_s > 0
+        self._former: set[str] = set()
         self._stops: dict[str, LastStop] = {**(stops or {})}
         self._otherwise = otherwise
 
@@ -122,6 +124,7 @@ class Registry:
                 pid=holder.pid,
             )
         entry.state, entry.given_s = newcomer, now_s
+        self._former.add(name)
 
     def claim_changed(self, address: str, holder: Incarnation, *, stands: bool) -> None:
         """Record that a claim began or ended."""
@@ -174,6 +177,10 @@ class Registry:
             and _is_same(entry.state, state)
         ):
             self._record(entry, state)
+
+    def has_former(self, name: str) -> bool:
+        """Return whether a component of this name may have registered before, here or at an earlier hub."""
+        return self._follows_another or name in self._former
 
     def last_stop(self, name: str) -> LastStop:
         """Return the last emergency stop of the component of this name, or of the former one."""
