@@ -1,8 +1,7 @@
 """Behavior: base class of every decision process except consoles.
 
 A behavior claims at most one ARC, is notified of the begin and end of grants, starts its children through the placer
-and reports its progress to its parent. Derive and override the hooks you need (``behavior_hooks``). Begin with a copy
-of ``behaviors/skeleton.py``.
+and reports its progress to its parent. Begin with a copy of ``behaviors/skeleton.py``.
 
 State on ``self`` survives every suspension, because only the RCs are taken and the process continues.
 
@@ -18,6 +17,7 @@ from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import msgspec
 
+from backbone.addresses import LAUNCHER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.class_path import load_class
 from backbone.component.component import Component
@@ -303,17 +303,17 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 return ReportNoted()
             case AskBehavior():
                 return state_of(self, self._children.rules, is_last=self.parameters.is_last)
-            case TakeBranch() as taken:
+            case TakeBranch() as taken if asked.source == LAUNCHER:
                 return await self._take(taken)
             case ListViews():
                 return self.views.listed()
             case LookAt() as look:
                 return self.views.look(look)
-            case BreakOff():
-                if asked.source != self.parameters.keeper:
-                    raise NotYourOrder(f"{asked.source} did not order {self.name}", behavior=self.name)
+            case BreakOff() if asked.source == self.parameters.keeper:
                 self.finish(BehaviorStatus.FAILURE, {"detail": "broken off by its operator"})
                 return BrokenOff()
+            case TakeBranch() | BreakOff():
+                raise NotYourOrder(f"{asked.source} does not order {self.name}", behavior=self.name)
             case body if isinstance(body, ArcNotice):
                 return await self.own_arc.handle(body)
             case _:

@@ -148,7 +148,7 @@ class NotAChild(Refusal):
 
 
 class NotYourOrder(Refusal):
-    """The sender is not the console that ordered this behavior."""
+    """Only the console that ordered a behavior breaks it off; only the launcher changes its place in the tree."""
 
     code = "behavior.not_your_order"
-    remedy = "Take the robot at a console; behaviors of the mission are stopped by 'scout-backbone stop'."
+    remedy = "Take the robot at a console, or change the mission by 'scout-backbone stop' and 'scout-backbone tree'."

@@ -4,20 +4,28 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from behaviors_of_a_placer import ARC, Spectator, node, root
 from fake_resource_pool import FakePlacer, Run
 
+from backbone.addresses import LAUNCHER
 from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import behavior_order
-from mission_control.messages import BehaviorStatus
+from mission_control.messages import BehaviorStatus, NotYourOrder
 
 
-async def take(placer: FakePlacer, version: int, top: dict[str, Any], *anew: str) -> BranchTaken:
+async def take(
+    placer: FakePlacer, version: int, top: dict[str, Any], *anew: str, source: str = LAUNCHER
+) -> BranchTaken:
     """Tell a root its place in a changed tree, as the launcher does."""
     placed = behavior_order(top, [("iros2001", 10)]).parameters
     place = {name: placed[name] for name in ("path", "arc", "children")}
     at = f"mission_control/{top['name']}"
-    return await placer.bus.ask(at, TakeBranch(version, place, list(anew)), BranchTaken, within_s=5.0)
+    bus = placer.network.join(source, placer.clock)
+    try:
+        return await bus.ask(at, TakeBranch(version, place, list(anew)), BranchTaken, within_s=5.0)
+    finally:
+        await bus.close()
 
 
 def test_a_changed_tree_ends_what_is_gone_begins_what_is_new_and_leaves_the_rest(placer_world: Run) -> None:
@@ -86,5 +94,18 @@ def test_a_parent_that_has_finished_says_so_and_starts_nothing(placer_world: Run
         assert await take(placer, 1, node("top", "parent", 5, children=[node("b")])) == BranchTaken("success")
         await placer.clock.sleep_s(5.0)
         assert "b" not in placer.started
+
+    placer_world(scene)
+
+
+def test_a_behavior_takes_its_place_from_the_launcher_only(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        top = await root(placer, node("top", "parent", 5, children=[node("a")]))
+        await placer.wait(lambda: "a" in placer.components)
+        with pytest.raises(NotYourOrder):
+            await take(placer, 2**53, node("top", "parent", 5, children=[]), source="ui_console/operator-1")
+        await take(placer, 1, node("top", "parent", 5, children=[node("b")]))
+        await placer.wait(lambda: "b" in placer.components)
+        assert list(top.children) == ["b"]
 
     placer_world(scene)
