@@ -315,7 +315,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             case TakeBranch() | BreakOff():
                 raise NotYourOrder(f"{asked.source} does not order {self.name}", behavior=self.name)
             case body if isinstance(body, ArcNotice):
-                return await self.own_arc.handle(body)
+                return await self.own_arc.answer(asked)
             case _:
                 raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 

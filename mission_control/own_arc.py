@@ -16,6 +16,7 @@ from backbone.component.messages import Absence
 from backbone.errors import LinkError, Refusal
 from backbone.mission.behavior_nodes import ArcNeed
 from backbone.reading_anew import WrongClass
+from backbone.wire import Envelope, Message
 from mission_control.acting import Acting, cancel
 from mission_control.behavior_hooks import BehaviorHooks, suspended_because
 from mission_control.behavior_of_parts import BehaviorOfParts
@@ -23,7 +24,6 @@ from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_ta
 from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import (
     ArcClient,
-    ArcNotice,
     Frame,
     Noted,
     NotMyArc,
@@ -80,15 +80,15 @@ class OwnArc:
         elif beside.client is not None and beside.client.granted is not None:
             await self.client.handle(beside.client.granted)
 
-    async def handle(self, notice: ArcNotice) -> Noted:
-        """Handle a notice of the ARC; see ``ArcClient.handle``.
+    async def answer(self, asked: Envelope[Message]) -> Noted:
+        """Answer a notice of the ARC; see ``ArcClient.answer``.
 
         Raises:
             NotMyArc: No ARC is claimed, or the notice comes from another one.
         """
         if self.client is None:
             raise NotMyArc(f"{self._owner.name} claims no ARC")
-        return await self.client.handle(notice)
+        return await self.client.answer(asked)
 
     def claim_as_now(self, need: ArcNeed | None) -> None:
         """Use the owner's present path and, if it is given, this need for the next claim."""

@@ -17,7 +17,7 @@ from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.messages import Stopper
 from backbone.errors import LinkError, Refusal, ReplyTimeout
 from backbone.keys import Conversation
-from backbone.naming import Subsystem, address
+from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, StopComponent
 from backbone.placer.wishes import Wish
 from backbone.rc_manager.messages import StaleEpoch
@@ -177,14 +177,18 @@ class ArcClient:
         keeper = ArcKeeper(self._bus, self.arc, self.wish, self, clock, on_changed)
         await keeper.keep(kind, parameters, rests=rests, is_there=is_there, patience_s=patience_s)
 
-    async def handle(self, notice: ArcNotice) -> Noted:
-        """Record a notice of the ARC and call the listener; return the reply to the ARC.
+    async def answer(self, asked: Envelope[Message]) -> Noted:
+        """Handle a notice that comes from the claimed ARC.
 
         Raises:
-            NotMyArc: The notice comes from another ARC than the claimed one.
+            NotMyArc: It comes from another component, or is no notice.
         """
-        if notice_arc(notice) not in ("", self.arc):
-            raise NotMyArc(f"{notice_arc(notice)} is not claimed here, {self.arc} is", arc=notice_arc(notice))
+        if asked.source != self.address or not isinstance(asked.body, ArcNotice):
+            raise NotMyArc(f"{asked.source} is not claimed here, {self.arc} is", arc=component_of(asked.source))
+        return await self.handle(asked.body)
+
+    async def handle(self, notice: ArcNotice) -> Noted:
+        """Record a notice of the ARC and call the listener; return the reply to the ARC."""
         match notice:
             case Resumed():
                 if self.granted is not None and self.granted.epochs == notice.epochs:

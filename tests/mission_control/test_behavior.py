@@ -135,12 +135,14 @@ def test_an_arc_left_from_an_earlier_life_is_ended_and_claimed_anew(placer_world
     placer_world(scene)
 
 
-def test_a_notice_of_a_foreign_arc_is_refused(placer_world: Run) -> None:
+@pytest.mark.parametrize("named", ["other", "watch1-capture"])
+def test_a_notice_of_another_component_than_its_arc_is_refused(placer_world: Run, named: str) -> None:
     async def scene(placer: FakePlacer) -> None:
-        await root(placer, node("watch1", arc=ARC))
+        top = await root(placer, node("watch1", arc=ARC))
         await placer.wait(lambda: placer.arcs)
         with pytest.raises(NotMyArc):
-            await placer.bus.ask("mission_control/watch1", Resumed("other", {}, {}, 1.0), Noted, within_s=1.0)
+            await placer.bus.ask("mission_control/watch1", Resumed(named, {}, {}, 1.0), Noted, within_s=1.0)
+        assert top.suspended_because
 
     placer_world(scene)
 

@@ -19,7 +19,7 @@ from backbone.component.launch import Launch
 from backbone.creator.messages import ReviseSpawn, SpawnRevised
 from backbone.dependency_database.messages import Resource
 from backbone.dependency_database.service import DependencyDatabase
-from backbone.naming import Subsystem, address
+from backbone.naming import Subsystem, address, component_of
 from backbone.rc_manager.service import RcManager
 from backbone.scheduling.requests import PathNode
 from backbone.wire import Envelope, Message
@@ -184,8 +184,7 @@ class Owner(Component[Any]):
                 slow_s, self.slow_s = self.slow_s, self.slow_s / 4
                 await self.clock.sleep_s(slow_s)
             self.notices.append(notice)
-            return await self.arcs[notice.arc].handle(notice)
-        return await next(iter(self.arcs.values())).handle(notice)
+        return await self.arcs[component_of(asked.source)].answer(asked)
 
     async def arc_resumed(self, notice: Resumed) -> None:
         pass

@@ -17,10 +17,9 @@ from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log.operators import OperatorAction
 from backbone.naming import IllegalName
-from backbone.wire import Message
+from backbone.wire import Envelope, Message
 from resource_pool.arc_client import (
     ArcClient,
-    ArcNotice,
     AskBeat,
     Frame,
     NotMyArc,
@@ -240,7 +239,7 @@ class ArcClaim:
         console.report("holds no robot")
         console.show(events.GivenBack(console.clock.now_s(), reason, confirmed, wanted))
 
-    async def handle(self, notice: ArcNotice) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer a notice of the ARC.
 
         Raises:
@@ -248,8 +247,8 @@ class ArcClaim:
         """
         if self._arc is None:
             raise NotMyArc(f"{self._console.name} claims no ARC")
-        arc = self._arc
-        noted = await arc.handle(notice)
+        arc, notice = self._arc, asked.body
+        noted = await arc.answer(asked)
         if isinstance(notice, AskBeat) and notice.state is not None and notice.state.epochs == arc.epochs != {}:
             self._console.show(events.HoldConfirmed(self._console.clock.now_s()))
         return noted

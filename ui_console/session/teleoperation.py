@@ -352,7 +352,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             return self._orders.reported(asked.source, asked.body)
         if not isinstance(asked.body, ArcNotice):
             return await super().answer(asked)
-        return await self._claim.handle(asked.body)
+        return await self._claim.answer(asked)
 
     async def drain(self) -> None:
         """Release all robots."""

@@ -125,7 +125,7 @@ class SimulatedOperator(Component[OperatorParameters]):
         """Answer the ARC's notices."""
         if not isinstance(asked.body, ArcNotice):
             raise NotMyArc(f"{self.name} answers its ARC alone")
-        return await self._arc.handle(asked.body)
+        return await self._arc.answer(asked)
 
     def statistics(self) -> dict[str, float]:
         """Count applied and failed commands."""

@@ -86,7 +86,7 @@ class SimulatedOwner(Component[OwnerParameters]):
             return await super().answer(asked)
         if self._arc is None:
             raise NotMyArc(f"{self.name} claims nothing", arc=notice_arc(notice))
-        return await self._arc.handle(notice)
+        return await self._arc.answer(asked)
 
     def absences(self) -> list[Absence]:
         """Return the ARC if it is wanted and missing."""
