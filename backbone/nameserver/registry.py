@@ -97,7 +97,6 @@ class Registry:
         self._hub_since_s, self._complete_from_s = hub_since_s, hub_since_s + reconnect_s
         self._entries: dict[str, _Entry] = {}
         self._introducing: set[str] = set()
-        self._follows_another = reconnect_s > 0
         self._former: set[str] = set()
         self._stops: dict[str, LastStop] = {**(stops or {})}
         self._otherwise = otherwise
@@ -180,7 +179,7 @@ class Registry:
 
     def has_former(self, name: str) -> bool:
         """Return whether a component of this name may have registered before, here or at an earlier hub."""
-        return self._follows_another or name in self._former
+        return self._complete_from_s > self._hub_since_s or name in self._former
 
     def last_stop(self, name: str) -> LastStop:
         """Return the last emergency stop of the component of this name, or of the former one."""
