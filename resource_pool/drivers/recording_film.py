@@ -39,16 +39,19 @@ class RecordingFilm:
             raise HardwareFault(refusal.detail, remedy=refusal.remedy) from refusal
         self._messages = self._recording.messages(self._keys)
         self._taken: Recorded | None = None
-        self._first_s = 0.0
+        self._first_s = self._last_s = 0.0
 
     def advance(self) -> float | None:
-        """Take the next picture; see ``recorded.Film``."""
+        """Take the next picture that is newer than the last one; see ``recorded.Film``."""
         for message in self._messages:
             body = message.body
             if message.schema.startswith(FRAMES) and isinstance(body, dict) and body.keys() >= PARTS:
                 at_s = float(body["captured_s"])
-                self._first_s = at_s if self._taken is None else self._first_s
-                self._taken = message
+                if self._taken is None:
+                    self._first_s = at_s
+                elif at_s <= self._last_s:
+                    continue
+                self._taken, self._last_s = message, at_s
                 return at_s - self._first_s
         return None
 
