@@ -55,6 +55,7 @@ class Meetings:
         self._meeting: dict[str, int] = {}
         self._newest: dict[str, int] = {}
         self._inspecting: set[str] = set()
+        self._looks = False
         self._ears: dict[str, list[Subscription]] = {}
 
     def are_under_way(self) -> bool:
@@ -68,7 +69,17 @@ class Meetings:
             self._begin_later(partial(self._inspect_now, host), f"inspect {host}")
 
     def _load_heard(self, heard: Envelope[HostLoad]) -> None:
+        """Also look again if this creator counts as lost: the news of its return may not have come."""
         self._carry_out(self._book.load_heard(heard.body))
+        if not self._book.is_alive(heard.body.host) and not self._meeting and not self._looks:
+            self._looks = True
+            self._begin_later(self._look_once, "look again")
+
+    async def _look_once(self) -> None:
+        try:
+            await self.look_again()
+        finally:
+            self._looks = False
 
     def _fall_heard(self, heard: Envelope[ProcessFell]) -> None:
         fell = heard.body
@@ -93,7 +104,9 @@ class Meetings:
                 self._note(component_of(NAMESERVER), f"does not list the creators: {error}")
                 return
             for creator in found.components:
-                if self._book.knows_creator(creator.host, creator.start):
+                if creator.state in LEAVING:
+                    self._carry_out(self._book.creator_down(creator.host, self._clock.now_s()))
+                elif self._book.knows_creator(creator.host, creator.start):
                     self._carry_out([Inspect(creator.host)])
                 else:
                     self.begin_meeting(creator)

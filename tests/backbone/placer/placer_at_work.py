@@ -74,7 +74,7 @@ class FakeCreator(Component[NoParameters]):
     def __init__(self, launch: Launch, bus: LocalBus, clock: VirtualClock, tags: list[str]) -> None:
         super().__init__(launch, bus, clock)
         self.network, self.tags = bus.network, tags
-        self.spawn_s, self.end_s = 0.1, 0.0
+        self.spawn_s, self.end_s, self.drain_s = 0.1, 0.0, 0.0
         self.answers_spawn = self.answers_list = True
         self.fails: list[str] = []
         self.spawns: list[str] = []
@@ -128,6 +128,7 @@ class FakeCreator(Component[NoParameters]):
         self.bus.publish(self.address, Conversation.TELEMETRY, load)
 
     async def drain(self) -> None:
+        await self.clock.sleep_s(self.drain_s)
         for name in list(self.lives):
             await self.kill_child(name)
 
