@@ -22,6 +22,8 @@ from backbone.ranges import (
 from backbone.wire import Message
 from scout_model.description import AirDescription
 
+FLOAT64_BYTES = 8
+
 
 class RadioPacket(Message, frozen=True, tag="RadioPacket/2"):
     """A packet on the air: published under the world's address as a command, without an acknowledgment.
@@ -106,3 +108,7 @@ class WorldState(Message, frozen=True):
     transmitting: Annotated[dict[Mention, Mention], MANY]
     on_since: Annotated[dict[Mention, Count], MANY] = {}
     motors: Annotated[dict[Mention, Share], MANY] = {}
+
+    def __post_init__(self) -> None:
+        if len(self.state) % FLOAT64_BYTES:  # the decoder refuses it as malformed
+            raise ValueError(f"{len(self.state)} bytes are no vector of float64")

@@ -15,7 +15,7 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.keys import Conversation
 from backbone.waiting import end_tasks
-from backbone.wire import Envelope
+from backbone.wire import Envelope, MalformedMessage, Reader, write
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated_video import GrabberOptions, SimulatedFramegrabber
 from resource_pool.drivers.world_messages import AskWorld, WorldModel, WorldState
@@ -104,6 +104,12 @@ async def test_a_drawing_that_fails_fails_the_rc() -> None:
     assert type(studio.bugs[0]).__name__ == "StateMismatch"
     assert pictures.empty()
     await studio.close()
+
+
+def test_a_state_of_broken_numbers_is_refused_by_its_reader_and_fails_no_rc() -> None:
+    raw = write(Envelope(1, "resource_pool/world", 1, 0.0, "", WorldState(1, 0.0, bytes(8), {})))
+    with pytest.raises(MalformedMessage, match="7 bytes are no vector of float64"):
+        Reader(WorldState).read(raw.replace(b"\xc4\x08" + bytes(8), b"\xc4\x07" + bytes(7)))
 
 
 async def test_what_is_being_drawn_at_the_end_of_a_hold_is_not_delivered() -> None:
