@@ -95,6 +95,7 @@ Priority = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]  # the mission file's
 Rank = Annotated[int, Meta(ge=-1, le=MOST_ENTRIES)]  # place among the holders of one RC; -1: unchanged
 MOST_PX = 8_192  # chosen: twice the width of a 4K picture
 PixelCount = Annotated[int, Meta(ge=0, le=MOST_PX)]
+PictureSide = Annotated[int, Meta(ge=1, le=MOST_PX)]  # pixels; an empty picture shows nothing
 PixelPlace = Annotated[int, Meta(ge=-8_192, le=8_192)]  # a region may begin outside the picture
 
 # Times, seconds.

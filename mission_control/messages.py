@@ -6,7 +6,19 @@ from typing import Annotated
 
 from backbone.errors import Refusal
 from backbone.mission.behavior_reports import BehaviorStatus, BreakOff, BrokenOff, ChildReport, ReportNoted
-from backbone.ranges import FEW, MANY, Count, Instant, Mention, PixelCount, PixelPlace, Pixels, Text, Values
+from backbone.ranges import (
+    FEW,
+    MANY,
+    Count,
+    Instant,
+    Mention,
+    PictureSide,
+    PixelCount,
+    PixelPlace,
+    Pixels,
+    Text,
+    Values,
+)
 from backbone.wire import Message
 
 __all__ = [
@@ -74,8 +86,8 @@ class GreyPicture(Message, frozen=True):
 
     robot: Mention
     captured_s: Instant
-    width_px: PixelCount
-    height_px: PixelCount
+    width_px: PictureSide
+    height_px: PictureSide
     pixels: Pixels
 
     def __post_init__(self) -> None:

@@ -22,7 +22,7 @@ from backbone.ranges import (
     Measure,
     Mention,
     Payload,
-    PixelCount,
+    PictureSide,
     Pixels,
     RunTime,
     Text,
@@ -316,8 +316,8 @@ class Frame(Message, frozen=True):
     robot: Mention
     number: Count
     captured_s: Instant
-    width_px: PixelCount
-    height_px: PixelCount
+    width_px: PictureSide
+    height_px: PictureSide
     pixels: Pixels
 
     def __post_init__(self) -> None:

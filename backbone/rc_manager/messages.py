@@ -23,6 +23,7 @@ from backbone.ranges import (
     Instant,
     LeaseSeconds,
     Mention,
+    Name,
     Priority,
     Quoted,
     Rank,
@@ -96,7 +97,7 @@ class Done(Message, frozen=True):
 class Beat(Message, frozen=True):
     """Heartbeat of an ARC and its owner; the ARC publishes it under ``Conversation.BEAT`` after each ``Leases``."""
 
-    arc: Mention
+    arc: Name
 
 
 # To ARCs.
@@ -178,7 +179,7 @@ class Connect(Message, frozen=True):
         rank: Place in the order of user priority among the holders, 0 first; for sharable RCs.
     """
 
-    arc: Mention
+    arc: Name
     epoch: Epoch
     lease_s: LeaseSeconds
     use: RcUse

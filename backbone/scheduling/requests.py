@@ -136,7 +136,7 @@ class Scheduled(Message, frozen=True):
 class Holder(Message, frozen=True):
     """One ARC an RC serves."""
 
-    arc: Mention
+    arc: Name
     epoch: Epoch
     since_s: Instant
     lease_until_s: Instant

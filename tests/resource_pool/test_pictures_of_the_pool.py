@@ -7,6 +7,7 @@ import dataclasses
 import math
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from pool_on_local_network import Pool, a_pool
@@ -16,6 +17,8 @@ from backbone.bus.clock import run_virtual
 from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.wire import Envelope, MalformedMessage, Message, Reader, write
+from mission_control.messages import GreyPicture
 from resource_pool.commands import Tune
 from resource_pool.drivers.interface import HardwareFault, Picture
 from resource_pool.messages import Applied, Frame
@@ -256,3 +259,17 @@ def test_a_frequency_the_framegrabber_does_not_receive_is_refused(local_mission:
             assert pool.grabber_driver.deliver is None
 
     run_virtual(main())
+
+
+@pytest.mark.parametrize("size_px", [(0, 0), (0, 8192), (8192, 0)], ids=str)
+@pytest.mark.parametrize(
+    "picture",
+    [Frame("grabber", "eyes", 3, "scout1", 1, 0.5, 1, 1, b"\0"), GreyPicture("scout1", 0.5, 1, 1, b"\0")],
+    ids=lambda picture: type(picture).__name__,
+)
+def test_a_picture_of_no_size_is_malformed_for_all_that_get_it(picture: Message, size_px: tuple[int, int]) -> None:
+    width_px, height_px = size_px
+    empty = msgspec.structs.replace(picture, width_px=width_px, height_px=height_px, pixels=b"")
+    raw = write(Envelope(1, "resource_pool/grabber", 1, 0.5, "", empty))
+    with pytest.raises(MalformedMessage, match=">= 1"):
+        Reader(type(picture)).read(raw)

@@ -9,7 +9,7 @@ from backbone.component.messages import ComponentState
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.errors import Refusal
-from backbone.naming import Subsystem, address, component_of, did_you_mean
+from backbone.naming import Subsystem, component_of, did_you_mean
 from backbone.placer.messages import Start
 from backbone.scheduling.views import RequestView
 from resource_pool.arc_client import ROBOT
@@ -114,7 +114,7 @@ def operator_of(request: RequestView) -> str:
     """Return the owner of a request; for the behavior of an order, the console that gave the order."""
     kind, _, console = request.priority.partition(":")[0].partition(" ")  # the first node of its path, see ``start_of``
     is_order = kind == "console" and component_of(request.owner).startswith(f"{console}-order-")
-    return address(Subsystem.UI_CONSOLE, console) if is_order else request.owner
+    return f"{Subsystem.UI_CONSOLE}/{console}" if is_order else request.owner
 
 
 def start_of(
