@@ -22,10 +22,10 @@ from backbone.wire import Message, schema_of
 
 A_MEGABYTE = 1_000_000
 TIED = {
-    ("Frame", "pixels"),
-    ("GreyPicture", "pixels"),
-    ("ViewPicture", "pixels"),
-}  # as many as rows and columns have: no value of one field alone is at its limit
+    **{(kind, side): 1 for kind in ("Frame", "GreyPicture") for side in ("width_px", "height_px")},
+    **{(kind, "pixels"): b"\0" for kind in ("Frame", "GreyPicture")},
+    ("ViewPicture", "pixels"): b"",
+}  # (message, field) → its plain value: as many pixels as rows and columns have, so none alone is at its limit
 
 
 class Sample(NamedTuple):
@@ -51,7 +51,8 @@ def catalogue() -> list[type[Message]]:
 
 def honest_body(kind: type[Any]) -> list[Any]:
     """Return the message with a plain value in each field."""
-    return [schema_of(kind), *(_honest(field.type) for field in _fields(kind))]
+    tied = ((TIED.get((kind.__name__, field.name)), field.type) for field in _fields(kind))
+    return [schema_of(kind), *(_honest(given) if plain is None else plain for plain, given in tied)]
 
 
 def limit_bodies(kind: type[Any]) -> Iterator[Sample]:

@@ -34,7 +34,7 @@ from backbone.wire import Accepts, Envelope, MalformedMessage, Message, Refused,
 ADDRESSES_KEPT = 4096  # chosen: more than a mission of 100 robots has
 
 Answered = Callable[[Envelope[Message] | None], None]
-"""Callback with the answer to a question, or None if the component died before it answered."""
+"""Callback with the answer to a question, or None if no component serves the address, or it died before it answered."""
 
 
 class LocalNetwork:
@@ -54,14 +54,11 @@ class LocalNetwork:
 
     # Transport. A network that loses messages overrides these three.
     def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
-        """Deliver the question to the component that serves the address, and its outcome to ``answered``.
-
-        Raises:
-            NoResponder: No component serves the address.
-        """
+        """Deliver the question to the component that serves the address, and its outcome to ``answered``."""
         server = self.servers.get(address)
         if server is None:
-            raise NoResponder(f"no component answers at {address}")
+            answered(None)
+            return
         answering = server.owner.start(_answer(server, asked))
         answering.add_done_callback(lambda task: answered(_outcome(task)))
 
@@ -85,7 +82,7 @@ class Neighbor(Declaring):
 
     async def ask_neighbor(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask the neighbor that serves the address; see ``Bus.ask``."""
-        answered = self.open_question()
+        answered, envelope = self.open_question(), None
         self.asked += 1
         asked = self.envelope(question)
         too_late = asyncio.get_running_loop().call_later(within_s, settle, answered, TimeoutError())
@@ -98,8 +95,10 @@ class Neighbor(Declaring):
         finally:
             too_late.cancel()
             self.end_question(answered)
+            if envelope is None:  # the answerer makes a copy only if its answer was lost or is late
+                self.tell(address, Conversation.ASK, asked)
         if envelope is None:
-            raise NoResponder(f"{address} died before it answered {type(question).__name__}")
+            raise NoResponder(f"no component answered {type(question).__name__} at {address}")
         if isinstance(envelope.body, Refused):
             raise envelope.body.revive()
         if not isinstance(envelope.body, reply):

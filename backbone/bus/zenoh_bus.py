@@ -124,22 +124,32 @@ class ZenohBus(LifeBus):
 
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""
-        asked_key = key(self._mission, address, Conversation.ASK)
-        answered, ends_s = self.open_question(), self._loop.time() + within_s
+        asked_key, asked = key(self._mission, address, Conversation.ASK), self.envelope(question)
+        payload, came = write(asked), cast("Came", None)
         self.asked += 1
         try:
-            payload, came = write(self.envelope(question)), cast("Came", NoInbox)
-            if (way := self.ways.way_to(address)) is not None:
-                came = await self.ways.ask(way, payload, answered, within_s)
+            came = await self._answer_to(address, asked_key, payload, within_s)
         finally:
-            self.end_question(answered)
-        if came is NoInbox:
-            came = await self._query(address, asked_key, payload, ends_s - self._loop.time())
+            if not isinstance(came, bytes):  # an answerer makes a copy only if its answer was lost or is late
+                self.tell(address, Conversation.ASK, asked)
         try:
             return read_answer(came, address, question, reply, within_s)
         except MalformedMessage:
             self.unreadable += 1
             raise
+
+    async def _answer_to(self, address: str, asked_key: str, payload: bytes, within_s: float) -> Came:
+        """Ask by the way that is known to the component, else, or if that leads nowhere, by a query."""
+        ends_s = self._loop.time() + within_s
+        if (way := self.ways.way_to(address)) is not None:
+            answered = self.open_question()
+            try:
+                came = await self.ways.ask(way, payload, answered, within_s)
+            finally:
+                self.end_question(answered)
+            if came is not NoInbox:
+                return came
+        return await self._query(address, asked_key, payload, ends_s - self._loop.time())
 
     async def _query(self, address: str, asked_key: str, payload: bytes, within_s: float) -> Came:
         answered = self.open_question()

@@ -13,8 +13,8 @@ def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
     """Return sender → number of messages missing between its first and its last, only for senders that miss any.
 
     Each sender numbers its messages, and a restarted sender begins again. Messages that are missing between the end of
-    a sender and its restart are unknown. A number is missing if its message was lost, if its key was not recorded, or
-    if it is a question without an answer. A question from before the begin, whose answer came later, does not count.
+    a sender and its restart are unknown. A number is missing if its message was lost, or if its key was not recorded. A
+    question from before the begin, whose answer came later, does not count.
 
     Args:
         messages: In the order of sending.

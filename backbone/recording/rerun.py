@@ -1,17 +1,19 @@
 """Rerun: runs components for real, on virtual time; the recording supplies everything around them.
 
 They get the recorded publications, tokens and questions at their recorded times. Their questions get the recorded
-answers, not earlier than recorded. To each other they send new messages, not the recorded ones. All their messages are
-kept, to be compared with those of the recorded components.
+answers, not earlier than recorded, and none where nobody answered. To each other they send new messages, not the
+recorded ones. All their messages are kept, to be compared with those of the recorded components.
 """
 
 from __future__ import annotations
 
 import asyncio
+from bisect import insort
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import itemgetter
 from typing import NamedTuple
 
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -38,6 +40,8 @@ MOST_WAITING_BYTES = 2**31
 NANOSECOND_S = 1e-9  # MCAP specification: times are whole nanoseconds
 Known = Mapping[str, type[Message]]
 ComponentType = Callable[[Launch, Bus, Clock], AnyComponent]
+_Answer = tuple[float, Message | None]
+"""The answer to a question, with its time; None: nobody answered, with the time of the question."""
 _TELL_OF_LAUNCHES = frozenset(schema_of(each) for each in (ComponentState, Parameters, Start, Types))
 
 
@@ -205,13 +209,13 @@ class _RecordedNetwork(LocalNetwork):
         self._recording, self._classes = recording, classes
         self._hearing = Hearing(classes)
         self._tokens: dict[str, Subscription] = {}
-        self._answers: dict[tuple[str, tuple[str, str, bytes]], deque[tuple[float, Message]]] = defaultdict(deque)
+        self._answers: dict[tuple[str, tuple[str, str, bytes]], deque[_Answer]] = defaultdict(deque)
         self._learn()
         self.begin_s = min(life.begin_s for life in self.lives.values())
 
     def _learn(self) -> None:
         """Find out when the components lived, and which answers the recorded ones gave them."""
-        asked: dict[str, tuple[str, str, Message]] = {}  # id → asker, asked component, question
+        asked: dict[str, tuple[float, str, str, Message]] = {}  # id → time, asker, asked component, question
         for message in self._recording.messages():
             address, is_asked = address_of(message.key), message.key.endswith(f"/{Conversation.ASK}")
             life = self.lives.get(message.source)
@@ -222,14 +226,17 @@ class _RecordedNetwork(LocalNetwork):
                 life.end_s = _sent_s(message)
                 is_elsewhere = is_asked and address not in self.lives
                 if is_elsewhere and (said := message_as_sent(self._classes, message)) is not None:
-                    asked[message.id] = message.source, address, said
+                    asked[message.id] = _sent_s(message), message.source, address, said
                 if not life.pid and message.schema == schema_of(ComponentState):
                     life.pid, life.start = int(message.body["pid"]), int(message.body.get("start", 0))
-            elif is_asked and message.cause in asked and asked[message.cause][1] == message.source == address:
+            elif is_asked and message.cause in asked and asked[message.cause][2] == message.source == address:
                 answer = message_as_sent(self._classes, message)
                 if answer is not None:
-                    asker, _address, question = asked.pop(message.cause)
+                    _asked_s, asker, _address, question = asked.pop(message.cause)
                     self._answers[asker, asked_of(address, question)].append((_sent_s(message), answer))
+        for asked_s, asker, address, question in asked.values():
+            known = self._answers[asker, asked_of(address, question)]
+            insort(known, (asked_s, None), key=itemgetter(0))
 
     async def play(self, bus: Bus, clock: Clock) -> None:
         """Publish the others' messages at their recorded times; return after the last message of a real component.
@@ -265,16 +272,20 @@ class _RecordedNetwork(LocalNetwork):
         if address in self.lives:
             super().carry_question(address, asked, answered)
             return
-        self._keep(key_of(self.mission, address, Conversation.ASK), write(asked), asked.stamp_s)
         known = self._answers[asked.source, asked_of(address, asked.body)]
         loop = asyncio.get_running_loop()
+        answer: Message | None
         if known:
             at_s, answer = known.popleft() if len(known) > 1 else known[0]
+            if answer is None:
+                answered(None)  # its asker tells the question
+                return
         elif isinstance(asked.body, Register):
             at_s, answer = loop.time(), Registered()
         else:
             name = type(asked.body).__name__
             at_s, answer = loop.time(), Refused.of(NotAnswered(f"{address} was not asked {name} with these values"))
+        self._keep(key_of(self.mission, address, Conversation.ASK), write(asked), asked.stamp_s)
         envelope = Envelope(WIRE_VERSION, address, 0, max(at_s, loop.time()), asked.id, answer)
         loop.call_at(max(at_s, loop.time()), answered, envelope)
 

@@ -14,6 +14,7 @@ from typing import IO
 import msgspec
 from mcap.writer import CompressionType, Writer
 
+from backbone.keys import Conversation
 from backbone.recording.hearing import Hearing
 from backbone.recording.json_schema import schema_json
 from backbone.recording.translation import Translated
@@ -27,7 +28,11 @@ CHUNK_BYTES = 256 * 1024  # chosen: a chunk is written well before the next flus
 MOST_AHEAD_S = 60.0  # chosen: larger than any difference of clocks with which a mission works
 MOST_CHANNELS = 60_000  # MCAP specification, op 0x04: id is a uint16; the rest is for channels of any sender
 MOST_SEQUENCE = 2**32  # MCAP specification, op 0x05: sequence is a uint32
+MOST_ASKED = 4096  # chosen: all questions of some seconds; mostly both copies of a question come within less
 MIME_XML = "application/xml"
+
+
+_ASK = f"/{Conversation.ASK}"
 
 
 class RecordingWriter:
@@ -53,6 +58,7 @@ class RecordingWriter:
         self._hearing = Hearing(classes, keys)
         self._schemas: dict[type[Message], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
+        self._asked: dict[tuple[str, int, float], None] = {}
         self._begin_s, self._end_s, self._is_finished = -math.inf, math.inf, False
         self.written = 0
         """Number of messages so far."""
@@ -76,6 +82,8 @@ class RecordingWriter:
         sent_s = message.stamp_s if is_credible else at_s
         if not self._begin_s <= sent_s <= self._end_s:
             return
+        if key.endswith(_ASK) and self._was_written(message):
+            return
         channel, data = self._channel_and_data(key, message)
         sent_ns = max(0, round(sent_s * NS))
         self._writer.add_message(
@@ -86,6 +94,19 @@ class RecordingWriter:
             data=data,
         )
         self.written += 1
+
+    def _was_written(self, message: Translated) -> bool:
+        """Return whether this question or answer was written before.
+
+        Asker and answerer both send a copy of a question whose answer was lost or late.
+        """
+        own = message.source, message.sequence, message.stamp_s
+        if own in self._asked:
+            return True
+        self._asked[own] = None
+        if len(self._asked) > MOST_ASKED:
+            del self._asked[next(iter(self._asked))]
+        return False
 
     def flush(self) -> None:
         """Hand all messages so far to the operating system."""

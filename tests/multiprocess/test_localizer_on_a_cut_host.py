@@ -59,6 +59,7 @@ def test_a_localizer_that_is_back_after_a_long_cut_has_all_motions(short_path: P
         assert before is not None
         assert after is not None
         first, second = after
-        assert math.dist((before[0].x_m, before[0].y_m), (first.x_m, first.y_m)) > 0.3, "it did not move meanwhile"
+        moved_m = math.dist((before[0].x_m, before[0].y_m), (first.x_m, first.y_m))
+        assert moved_m > 0.3, ("it did not move meanwhile", before, after, mission.story())
         assert math.dist((first.x_m, first.y_m), (second.x_m, second.y_m)) < 0.05, (after, mission.story())
         assert second.spread_m < first.spread_m + 0.05, after

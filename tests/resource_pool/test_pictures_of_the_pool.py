@@ -17,6 +17,7 @@ from backbone.bus.clock import run_virtual
 from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.ranges import MOST_PX
 from backbone.wire import Envelope, MalformedMessage, Message, Reader, write
 from mission_control.messages import GreyPicture
 from resource_pool.commands import Tune
@@ -261,15 +262,18 @@ def test_a_frequency_the_framegrabber_does_not_receive_is_refused(local_mission:
     run_virtual(main())
 
 
-@pytest.mark.parametrize("size_px", [(0, 0), (0, 8192), (8192, 0)], ids=str)
+@pytest.mark.parametrize("size_px", [(0, 0), (0, 8192), (8192, 0), (8193, 1), (1, 8193), (8192, 1), (1, 8192)], ids=str)
 @pytest.mark.parametrize(
     "picture",
     [Frame("grabber", "eyes", 3, "scout1", 1, 0.5, 1, 1, b"\0"), GreyPicture("scout1", 0.5, 1, 1, b"\0")],
     ids=lambda picture: type(picture).__name__,
 )
-def test_a_picture_of_no_size_is_malformed_for_all_that_get_it(picture: Message, size_px: tuple[int, int]) -> None:
+def test_a_picture_without_pixels_or_with_too_many_is_malformed(picture: Message, size_px: tuple[int, int]) -> None:
     width_px, height_px = size_px
-    empty = msgspec.structs.replace(picture, width_px=width_px, height_px=height_px, pixels=b"")
-    raw = write(Envelope(1, "resource_pool/grabber", 1, 0.5, "", empty))
-    with pytest.raises(MalformedMessage, match=">= 1"):
-        Reader(type(picture)).read(raw)
+    sized = msgspec.structs.replace(picture, width_px=width_px, height_px=height_px, pixels=bytes(width_px * height_px))
+    raw, reader = write(Envelope(1, "resource_pool/grabber", 1, 0.5, "", sized)), Reader(type(picture))
+    if all(1 <= side <= MOST_PX for side in size_px):
+        assert reader.read(raw).body == sized
+    else:
+        with pytest.raises(MalformedMessage, match=r"[<>]= "):
+            reader.read(raw)

@@ -20,7 +20,6 @@ from contextvars import Context
 from backbone.bus.interface import Clock, LinkListener
 from backbone.bus.local_bus import Answered, LocalBus, LocalNetwork
 from backbone.bus.neighbor_declarations import Listening, NeighborDeclaration, Watching
-from backbone.errors import NoResponder
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.simulated_processes import SimulatedProcess, current_process
 
@@ -270,12 +269,14 @@ class LinkedNetwork(LocalNetwork):
         """Deliver the question over both links, and return the answer."""
         own, server = self.links.get(_own()), self.servers.get(address)
         if own is None or own.process.is_dead:
-            raise NoResponder("this process is dead")
+            answered(None)
+            return
         if server is not None and self._link_of(server) is own:
             LocalNetwork.carry_question(self, address, asked, answered)
             return
         if not own.is_up:
-            raise NoResponder("this process has no link")
+            answered(None)
+            return
 
         def end(outcome: Envelope[Message] | None = None) -> None:
             if question not in ended:
@@ -299,11 +300,7 @@ class LinkedNetwork(LocalNetwork):
                 else:
                     theirs.carry(lambda: own.carry(lambda: end(outcome), end), end)
 
-            try:
-                theirs.process.run(LocalNetwork.carry_question, self, address, asked, back)
-            except NoResponder:
-                theirs.questions.pop(question, None)
-                end()
+            theirs.process.run(LocalNetwork.carry_question, self, address, asked, back)
 
         question, ended = object(), set[object]()
         own.questions[question] = end

@@ -20,7 +20,6 @@ from collections.abc import Callable
 from backbone.addresses import PLACER
 from backbone.bus.local_bus import Answered, LocalNetwork
 from backbone.bus.neighbor_declarations import Listening, Watching
-from backbone.errors import NoResponder
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.faults import Fates, MessageFault
 
@@ -65,18 +64,12 @@ class UnreliableNetwork(LocalNetwork):
         def ask(tell: Answered) -> None:
             LocalNetwork.carry_question(self, address, asked, tell)
 
-        def arrive_late() -> None:
-            try:
-                ask(travel_back)
-            except NoResponder:
-                answered(None)
-
         if fault is None and not self._is_slow(source, address):
             ask(travel_back)
             return
-        self._travel(source, address, fault, arrive_late)
+        self._travel(source, address, fault, lambda: ask(travel_back))
         if fault is not None and fault.effect == "doubled":
-            self._travel(source, address, None, lambda: self._ask_again(ask))
+            self._travel(source, address, None, lambda: ask(lambda _outcome: None))
 
     def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Message]) -> None:
         """Deliver the publication to this listener, with its fault."""
@@ -89,14 +82,6 @@ class UnreliableNetwork(LocalNetwork):
     def carry_life(self, watching: Watching, address: str, alive: bool) -> None:
         """Deliver the change of a token; to a component that is cut off, late."""
         self._travel("", watching.owner.source, None, lambda: watching.notify(address, alive))
-
-    @staticmethod
-    def _ask_again(ask: Callable[[Answered], None]) -> None:
-        """Deliver the copy of a question; its answer is dropped."""
-        try:
-            ask(lambda _outcome: None)
-        except NoResponder:
-            return
 
     def _fault(self, source: str, target: str, name: str) -> MessageFault | None:
         if not self._begin_s <= asyncio.get_running_loop().time() < self._end_s:

@@ -23,6 +23,7 @@ from bus_laws import (
 )
 
 from backbone.bus.interface import Copies, Told
+from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation
 from backbone.wire import Envelope, Message, Reader, Refused, write
 
@@ -199,6 +200,63 @@ def test_questions_are_told_with_their_answers_while_somebody_overhears_that(on_
             subscribed.close()
             assert server.statistics().told > 0
             assert server.statistics().published == published, "copies are counted apart"
+
+    on_bus(law)
+
+
+@pytest.mark.parametrize("ends", ["nobody is there", "no answer in time", "cancelled"])
+def test_a_question_without_an_answer_is_told_once_by_its_asker(on_bus: Runner, ends: str) -> None:
+    async def hang(_asked: Envelope[Any]) -> Message:
+        await asyncio.Event().wait()
+        raise AssertionError("waits for ever")
+
+    async def law(net: Net) -> None:
+        listener, told, came, asked = net.join(THIRD), list[Copies](), asyncio.Event(), list[str]()
+
+        def overheard(_key: str, raw: bytes) -> None:
+            told.extend(Reader(Told).read(raw).body.copies)
+            came.set()
+
+        async with pair(net, hang) as (asker, server):
+
+            async def ask_in_vain(text: str) -> None:
+                asked.append(text)
+                within_s = ASK_S if ends == "nobody is there" else 0.02
+                asking = asker.ask(SERVER, Echo(text), Echoed, within_s=within_s)
+                match ends:
+                    case "nobody is there":
+                        with pytest.raises(NoResponder):
+                            await asking
+                    case "no answer in time":
+                        with pytest.raises(ReplyTimeout):
+                            await asking
+                    case _:
+                        task = asyncio.create_task(asking)
+                        await net.clock.sleep_s(0.005)
+                        task.cancel()
+                        await asyncio.wait({task})
+
+            async def heard_one() -> None:
+                while not told:  # the asker knows of a listener a moment later
+                    await ask_in_vain(f"number {len(asked)}")
+                    await net.clock.sleep_s(0.005)
+
+            async def heard_last() -> None:
+                while Reader(Echo).read(told[-1].messages[-1]).body.text != "last":
+                    came.clear()
+                    await came.wait()
+
+            if ends == "nobody is there":
+                await server.close()
+            listener.overhear(Conversation.TOLD, overheard, 1_000_000)
+            await until_known(listener, asker)
+            await within(heard_one(), "a question without an answer")
+            await ask_in_vain("last")
+            await within(heard_last(), "the last question")
+            assert {(one.address, one.conversation) for one in told} == {(SERVER, "ask")}
+            questions = [Reader(Echo).read(raw) for one in told for raw in one.messages]
+            assert [question.body.text for question in questions] == asked[-len(questions) :]
+            assert {question.source for question in questions} == {ASKER}
 
     on_bus(law)
 

@@ -241,6 +241,25 @@ def test_a_time_that_is_not_credible_orders_nothing(stamp_s: float) -> None:
     assert (found.at_s, found.stamp_s) == (3.0, stamp_s)
 
 
+def test_a_question_of_which_asker_and_answerer_send_copies_is_written_once() -> None:
+    """Its answer was lost on the way back, so the asker believes that nobody answered."""
+    file = io.BytesIO()
+    made, at = writer(file), f"scout/m/{SOURCES[1]}/ask"
+    for number in range(3):
+        made.write(at, raw(SOURCES[0], number, story(number)), 5.0)
+    for number in (1, 3):
+        made.write(at, raw(SOURCES[0], number, story(number)), 5.1)
+    made.write(at, raw(SOURCES[1], 1, story(1)), 5.1)
+    made.finish()
+    assert [(one.source, one.sequence) for one in read(file.getvalue(), "*/ask")] == [
+        (SOURCES[0], 0),
+        (SOURCES[0], 1),
+        (SOURCES[1], 1),
+        (SOURCES[0], 2),
+        (SOURCES[0], 3),
+    ]
+
+
 def test_a_question_whose_answer_took_hours_stands_where_it_was_asked() -> None:
     file = io.BytesIO()
     made = writer(file)

@@ -13,8 +13,10 @@ from recorded_missions import CLASSES, record_mission
 from small_recordings import SCOUT, Said, recorded
 
 from backbone.component.class_path import load_class
+from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import ComponentState, LifeState
+from backbone.component.messages import AskState, ComponentState, LifeState, StoryEvent
+from backbone.errors import NoResponder
 from backbone.keys import Conversation
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
@@ -22,6 +24,7 @@ from backbone.recording.comparison import KeyComparison, compared
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.rerun import NoSuchComponent, RealComponent, classes_of, launch_of, run_again
 from backbone.recording.revival import with_names
+from backbone.wire import schema_of
 
 MISSION_XML = Path(__file__).parents[3] / "mission.xml"
 LASTED_S = 19.0  # chosen: shorter than COMPARE_EVERY_S, when both children are asked for at one instant, in any order
@@ -102,6 +105,30 @@ def test_a_component_that_falls_is_told(recording: Recording):
     [(name, bug)] = run_again(recording, CLASSES, [RealComponent(launch, Broken)]).fell.items()
     assert name == "watch-scout1"
     assert isinstance(bug, ZeroDivisionError)
+
+
+def test_a_question_that_nobody_answered_gets_no_answer_again_and_is_said_once() -> None:
+    class Asker(Component[NoParameters]):
+        async def connect(self) -> None:
+            for _ in range(2):
+                try:
+                    await self.bus.ask(SCOUT, AskState(), ComponentState, within_s=1.0)
+                    self.publish_event(self.name, "got an answer")
+                except NoResponder:
+                    self.publish_event(self.name, "found nobody")
+
+    launch = Launch("local", Subsystem.MISSION_CONTROL, "asker", "asker", "x:Y", "base", "", 0.0, 1.0, {})
+    state, asker = ComponentState(SCOUT, "scout", "base", 7, LifeState.READY, 0.5, ""), launch.address
+    asked = [
+        Said(1.0, asker, Conversation.LOG, StoryEvent(1.0, asker, "begins", "asker", ""), asker),
+        Said(1.1, SCOUT, Conversation.ASK, AskState(), asker),
+        Said(1.2, SCOUT, Conversation.ASK, AskState(), asker),
+        Said(1.2, SCOUT, Conversation.ASK, state, SCOUT, f"{asker}#3"),
+    ]
+    said = run_again(Recording(recorded(asked)), CLASSES, [RealComponent(launch, Asker)]).said
+    assert sum(one.schema == schema_of(AskState) for one in said) == 2
+    events = [one.body["what"] for one in said if one.schema == schema_of(StoryEvent)]
+    assert [what for what in events if "answer" in what or "nobody" in what] == ["found nobody", "got an answer"]
 
 
 def test_of_nobody_there_is_no_launch(recording: Recording):
