@@ -69,9 +69,6 @@ class Motions(Message, frozen=True):
 class PublishedMotions:
     """The motions of an RC, also those of its former processes on this host.
 
-    Attributes:
-        has_former: An RC of this name may have moved the robot before, here or elsewhere.
-
     Args:
         bus: The RC's.
         begun_s: Mission time at which the process began.
@@ -81,7 +78,6 @@ class PublishedMotions:
     def __init__(self, bus: Bus, begun_s: float, run_directory: str) -> None:
         self._bus = bus
         self._file = MotionFile(run_directory, component_of(bus.source))
-        self.has_former = False
         self._before: LastMove | None = None
         self._born_s = begun_s
         self._begun_s, former = self._file.read() or (begun_s, [])
@@ -90,7 +86,7 @@ class PublishedMotions:
         self._room = 0
 
     async def ask_before(self, radio: str, network_id: int, within_s: float) -> None:
-        """Ask the robot's radio for its last motion before this process; the first one of the mission need not.
+        """Ask the robot's radio for its last motion before this process.
 
         The record of former processes on this host is forgotten if the robot moved after it, by an RC elsewhere.
 
@@ -98,8 +94,6 @@ class PublishedMotions:
             radio: Address of the radio.
             within_s: How long to wait for its answer, seconds of the machine.
         """
-        if not self.has_former:
-            return
         try:
             before = await self._bus.ask(radio, AskLastMove(network_id), LastMove, within_s=within_s)
         except (Refusal, LinkError) as error:  # the radio begins, too, or is of another make

@@ -24,8 +24,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.abilities import NO_ABILITIES, Abilities
 from backbone.component.common_answers import CommonAnswers
 from backbone.component.launch import Launch
-from backbone.component.log_level import LogLevel
-from backbone.component.messages import Absence, CommonQuestion, ComponentState, LastStop, LifeState, Registered
+from backbone.component.messages import Absence, CommonQuestion, ComponentState, LastStop, LifeState, LogLevel
 from backbone.component.name_claim import claim_name
 from backbone.component.own_tasks import OwnTasks
 from backbone.component.parameter_values import parameters_from
@@ -179,8 +178,11 @@ class Component(Generic[P_co]):
         """Return the last emergency stop of this component; call ``changed`` when the result changes."""
         return LastStop()
 
-    def registered(self, answer: Registered) -> None:
-        """Take over what the nameserver knows of the former component of this name. When: before ``connect``."""
+    def resume_stop(self, last: LastStop) -> None:
+        """Take over the last emergency stop of the former component of this name, perhaps on another host.
+
+        When: before ``connect``, if that component was ever stopped.
+        """
 
     def person(self) -> str:
         """Return the name of the person at this component; empty: no person."""
@@ -323,8 +325,8 @@ class Component(Generic[P_co]):
         await self.bus.close()
 
     async def _claim_name(self) -> None:
-        if self.registers:
-            self.registered(await claim_name(self.bus, self.clock, self.component_state()))
+        if self.registers and (last := await claim_name(self.bus, self.clock, self.component_state())) != LastStop():
+            self.resume_stop(last)
 
     async def _live_and_report_end(self) -> None:
         try:

@@ -168,11 +168,9 @@ class Registered(Message, frozen=True):
 
     Attributes:
         last_stop: The last stop of this component, or of the former one of this name, if it is known.
-        has_former: False: in this mission no other component had this name before.
     """
 
     last_stop: LastStop = LastStop()
-    has_former: bool = False
 
 
 class NameTaken(Refusal):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
-from backbone.component.messages import ComponentState, NameTaken, Register, Registered
+from backbone.component.messages import ComponentState, LastStop, NameTaken, Register, Registered
 from backbone.naming import claim_address
 from backbone.operating_system.processes import exists
 
@@ -14,11 +14,11 @@ REGISTER_AGAIN_S = 0.1  # chosen: the nameserver forgets a name without a claim 
 REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
 
 
-async def claim_name(bus: Bus, clock: Clock, state: ComponentState) -> Registered:
+async def claim_name(bus: Bus, clock: Clock, state: ComponentState) -> LastStop:
     """Register the name and declare its claim, so that the nameserver also sees a death before readiness.
 
     Returns:
-        What the nameserver knows of the former component of this name.
+        The last emergency stop of the former component of this name, as the nameserver knows it.
 
     Raises:
         NameTaken: A living component has the name.
@@ -36,7 +36,7 @@ async def claim_name(bus: Bus, clock: Clock, state: ComponentState) -> Registere
                 raise
         await clock.sleep_s(REGISTER_AGAIN_S * clock.rate)
     bus.declare_alive(claim_address(state.address, state.incarnation))
-    return registered
+    return registered.last_stop
 
 
 def _is_of_the_dead(taken: NameTaken, host: str) -> bool:

@@ -97,7 +97,6 @@ class Registry:
         self._hub_since_s, self._complete_from_s = hub_since_s, hub_since_s + reconnect_s
         self._entries: dict[str, _Entry] = {}
         self._introducing: set[str] = set()
-        self._former: set[str] = set()
         self._stops: dict[str, LastStop] = {**(stops or {})}
         self._otherwise = otherwise
 
@@ -123,7 +122,6 @@ class Registry:
                 pid=holder.pid,
             )
         entry.state, entry.given_s = newcomer, now_s
-        self._former.add(name)
 
     def claim_changed(self, address: str, holder: Incarnation, *, stands: bool) -> None:
         """Record that a claim began or ended."""
@@ -176,10 +174,6 @@ class Registry:
             and _is_same(entry.state, state)
         ):
             self._record(entry, state)
-
-    def has_former(self, name: str) -> bool:
-        """Return whether a component of this name may have registered before, here or at an earlier hub."""
-        return self._complete_from_s > self._hub_since_s or name in self._former
 
     def last_stop(self, name: str) -> LastStop:
         """Return the last emergency stop of the component of this name, or of the former one."""

@@ -149,7 +149,6 @@ class Nameserver(Component[NameserverParameters]):
 
     def _give_name(self, component: ComponentState) -> Registered:
         name = component_of(component.address)
-        has_former = self._registry.has_former(name)
         try:
             self._registry.registered(component, self.clock.now_s())
         except NameTaken as taken:
@@ -158,7 +157,7 @@ class Nameserver(Component[NameserverParameters]):
             raise
         self._registrations += 1
         self.story.note(name, f"registered as {component.address} on {component.host}, pid {component.pid}")
-        return Registered(self._registry.last_stop(name), has_former)
+        return Registered(self._registry.last_stop(name))
 
     def _claim_changed(self, claim: str, stands: bool) -> None:
         try:

@@ -17,7 +17,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.component.messages import LastStop, Registered
+from backbone.component.messages import LastStop
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -101,11 +101,10 @@ class RobotRc(ResourceController[P], Generic[P]):
             say=functools.partial(self.publish_event, self.name),
         )
 
-    def registered(self, answer: Registered) -> None:
+    def resume_stop(self, last: LastStop) -> None:
         """Stay stopped, or not, as the RC's former process, if that one knew of a later stop or lift than this host."""
-        if self._latch.resume(answer.last_stop):
+        if self._latch.resume(last):
             self._keep_stop()
-        self._motions.has_former = answer.has_former
 
     async def connect(self) -> None:
         """Also subscribe to the robot's replies."""

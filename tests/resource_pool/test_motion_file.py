@@ -47,7 +47,6 @@ async def test_a_record_of_this_host_ends_if_the_robot_moved_elsewhere_since(
     network, clock = LocalNetwork(), MissionClock.started_now()
     bus, radio = (network.join(f"resource_pool/{name}", clock) for name in ("scout1", "radio"))
     nxt = PublishedMotions(bus, 20.0, str(tmp_path))
-    nxt.has_former = True
     await nxt.ask_before(radio.source, 1, within_s=1)
     assert nxt.since(0.0).begun_s == 5.0, "no radio answers"
     told = LastMove(1.0, moved_s)
@@ -63,15 +62,6 @@ async def test_a_record_of_this_host_ends_if_the_robot_moved_elsewhere_since(
     nxt.publish(motion(21.0))
     assert numbers(nxt) == ([1, 2] if is_kept else [1])
     assert numbers(process(tmp_path, 30.0)) == numbers(nxt)
-
-
-async def test_the_first_rc_of_a_robot_does_not_ask_for_earlier_motions() -> None:
-    network, clock = LocalNetwork(), MissionClock.started_now()
-    bus, radio = (network.join(f"resource_pool/{name}", clock) for name in ("scout1", "radio"))
-    radio.serve(radio.source, AskLastMove, lambda _asked: pytest.fail("it asks"))
-    first = PublishedMotions(bus, 20.0, "")
-    await first.ask_before(radio.source, 1, within_s=1)
-    assert first.since(0.0).before is None
 
 
 @pytest.mark.parametrize("count", [1, 2, KEPT, KEPT + 1, 2 * KEPT + 2, 5 * KEPT])

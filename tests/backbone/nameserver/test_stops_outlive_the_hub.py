@@ -1,4 +1,4 @@
-"""What a component learns of the former one of its name, also after a restart of the hub."""
+"""The stop of a robot whose RC is down outlives a restart of the hub, for an RC on another host."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from test_nameserver_service import Probe, nameserver, probe
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.messages import LastStop, Registered, StandingStop
+from backbone.component.messages import LastStop, StandingStop
 from backbone.nameserver.stops_file import FILE_NAME
 
 FIRE, LIFTED = LastStop(3, StandingStop(3, "anna", "fire", 1.0)), LastStop(3)
@@ -20,15 +20,12 @@ class Stoppable(Probe):
     """A component that an operator has stopped, and that takes over the stop of its former process."""
 
     stop = LastStop()
-    has_former = False
 
     def last_stop(self) -> LastStop:
         return self.stop
 
-    def registered(self, answer: Registered) -> None:
-        self.has_former = answer.has_former
-        if answer.last_stop.number:
-            self.stop = answer.last_stop
+    def resume_stop(self, last: LastStop) -> None:
+        self.stop = last
 
 
 async def _stop_of_the_next(network: LocalNetwork, beside: Any, name: str = "scout1") -> LastStop:
@@ -96,19 +93,5 @@ def test_a_hub_that_cannot_keep_a_stop_says_so_and_goes_on(tmp_path: Path, besid
             await _stopped_and_gone(network, beside)
             assert any("will not know which robots are stopped" in one.what for one in hub.story.of("nameserver"))
             assert await _stop_of_the_next(network, beside) == FIRE
-
-    run_virtual(main())
-
-
-def test_a_component_learns_whether_another_had_its_name_before(tmp_path: Path, beside: Any) -> None:
-    async def main() -> None:
-        network, learnt = LocalNetwork(), []
-        for names in (["scout1", "scout2", "scout1"], ["scout3"]):
-            async with beside(nameserver(network, str(tmp_path))):
-                for name in names:
-                    one = probe(network, name, Stoppable)
-                    async with beside(one):
-                        learnt.append(one.has_former)
-        assert learnt == [False, False, True, True], "the last registers at another hub, which does not know"
 
     run_virtual(main())
