@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from namespaces import NetworkHost
 from test_go_to_mission import GO_TO
-from three_hosts import NAME, mission_on_three_hosts
+from three_hosts import NAME, mission_on_three_hosts, types_on
 
 from backbone.keys import Conversation
 from mission_control.messages import WaypointReached
@@ -18,19 +18,20 @@ from mission_control.messages import WaypointReached
 pytestmark = [pytest.mark.processes, pytest.mark.thorough, pytest.mark.timeout(300)]
 
 PATROL = "patrol-scout2"
-OTHERS = 12  # they keep the behaviors off the machine with the hub
+DRIVING = types_on(outside="sequence wait go_to return_home patrol drive")
 WITHIN_S = 120.0
 
 
 def with_a_patrol(hosts: dict[str, NetworkHost]) -> str:
     """Return ``go-to.xml`` for three machines: all resources on base, and a patrol in place of the follower."""
     text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{NAME}", GO_TO.read_text(encoding="utf-8"), count=1)
-    machines = "".join(f'<host name="{name}" address="{host.address}"/>' for name, host in hosts.items())
+    machines = "".join(
+        f'<host name="{name}" address="{host.address}" tags="{"inside" if name == "base" else "outside"}"/>'
+        for name, host in hosts.items()
+    )
     text = re.sub(r'(<resource [^>]*?) process="hardware"', r'\1 host="base"', text)
-    more = "".join(f'<resource type="localizer" name="other{number}" host="base"/>' for number in range(OTHERS))
     for before, after in [
-        ("<resources>", f"<hosts>{machines}</hosts><resources>"),
-        ("</resources>", f"{more}</resources>"),
+        ("<resources>", f"{DRIVING}<hosts>{machines}</hosts><resources>"),
         ('type="follow" name="follow-scout1"', f'type="patrol" name="{PATROL}"'),
         ('<parameter name="target" value="scout1"/>', '<parameter name="waypoints" value="1,3 1.6,3 1,3.5"/>'),
         ('<parameter name="distance_m" value="0.6"/>', '<parameter name="reached_within_m" value="0.15"/>'),

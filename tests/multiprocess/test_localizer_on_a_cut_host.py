@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from namespaces import NetworkHost
 from test_go_to_mission import GO_TO
-from three_hosts import NAME, ThreeHosts, mission_on_three_hosts
+from three_hosts import NAME, ThreeHosts, mission_on_three_hosts, types_on
 
 from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
 from backbone.errors import LinkError
@@ -20,19 +20,25 @@ from resource_pool.localization import AskPose, Pose
 pytestmark = [pytest.mark.processes, pytest.mark.thorough, pytest.mark.timeout(240)]
 
 FIRST, SECOND, ROBOT = "localizer", "second", "scout1"
-OTHERS = 12  # they keep the behaviors off the machine that is cut
+DRIVING = types_on(inside="sequence wait go_to return_home follow drive")
 
 
 def two_localizers(hosts: dict[str, NetworkHost]) -> str:
-    """Return ``go-to.xml`` for three machines, with a second localizer on far."""
+    """Return ``go-to.xml`` for three machines, with nothing on far but a second localizer."""
     text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{NAME}", GO_TO.read_text(encoding="utf-8"), count=1)
-    machines = "".join(f'<host name="{name}" address="{host.address}"/>' for name, host in hosts.items())
-    text = re.sub(r'(<resource [^>]*?) process="hardware"', r'\1 host="base"', text)
-    names = [SECOND, *(f"other{number}" for number in range(OTHERS))]
-    more = "".join(f'<resource type="localizer" name="{name}" host="far"/>' for name in names)
-    return text.replace("<resources>", f"<hosts>{machines}</hosts><resources>").replace(
-        "</resources>", f"{more}</resources>"
+    machines = "".join(
+        f'<host name="{name}" address="{host.address}" tags="{"outside" if name == "far" else "inside"}"/>'
+        for name, host in hosts.items()
     )
+    text = re.sub(r'(<resource [^>]*?) process="hardware"', r'\1 host="base"', text)
+    for before, after in [
+        ('<world seed="1">', '<world seed="1" host="base">'),
+        ("<resources>", f"{DRIVING}<hosts>{machines}</hosts><resources>"),
+        ("</resources>", f'<resource type="localizer" name="{SECOND}" host="far"/></resources>'),
+    ]:
+        assert text.count(before) == 1
+        text = text.replace(before, after)
+    return text
 
 
 async def poses(mission: ThreeHosts, *localizers: str) -> list[Pose]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from namespaces import NetworkHost
 from test_go_to_mission import GO_TO
-from three_hosts import NAME, ThreeHosts, mission_on_three_hosts
+from three_hosts import NAME, ThreeHosts, mission_on_three_hosts, types_on
 
 from backbone.errors import LinkError
 from resource_pool.localization import AskPose, Pose
@@ -20,10 +20,8 @@ from resource_pool.localization import AskPose, Pose
 pytestmark = [pytest.mark.processes, pytest.mark.thorough, pytest.mark.timeout(240)]
 
 ROBOT, WORLD, LOCALIZER = "scout1", "world", "localizer"
-FIELD = """<types><type name="scout" class="resource_pool.rcs.scout:Scout" subsystem="resource_pool"
-uses="command_radio" tags="field"/></types>"""
+TYPES = types_on(field="scout", indoors="sequence wait patrol return_home follow drive")
 TAGS = {"base": "indoors", "near": "field", "far": "field"}
-OTHERS = 6  # they keep the behaviors off the machines that are cut
 KNOWN_M = 0.3  # chosen: a time of 2 s without motions is a spread of 0.4 m
 
 
@@ -33,17 +31,11 @@ def robots_in_the_field(hosts: dict[str, NetworkHost]) -> str:
     machines = "".join(
         f'<host name="{name}" address="{host.address}" tags="{TAGS[name]}"/>' for name, host in hosts.items()
     )
-    more = "".join(
-        f'<resource type="localizer" name="other{number}-{host}" host="{host}"/>'
-        for number in range(OTHERS)
-        for host in ("near", "far")
-    )
     text = re.sub(r'(type="scout" name="\w+") process="hardware"', r"\1", text)
     for before, after in [
         (' process="hardware"', ' host="base"'),
         ('<world seed="1">', '<world seed="1" host="base">'),
-        ("<resources>", f"{FIELD}<hosts>{machines}</hosts><resources>"),
-        ("</resources>", f"{more}</resources>"),
+        ("<resources>", f"{TYPES}<hosts>{machines}</hosts><resources>"),
         ('type="go_to" name="go-out"', 'type="patrol" name="go-out"'),
         ('<parameter name="x_m" value="3"/>', '<parameter name="waypoints" value="3,2 1,1"/>'),
         ('<parameter name="y_m" value="2"/>', ""),

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from lxml import etree
 from namespaces import NetworkHost, hosts_on_a_switch
 from running_mission import MARK, MISSION_XML
 
@@ -30,6 +31,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import ComponentState
 from backbone.errors import BackboneError
+from backbone.mission.shipped_types import shipped_text
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 
@@ -235,6 +237,20 @@ class Copies:
                 if not NO_COMPONENTS.fullmatch(name):
                     found[name].append(host)
         return found
+
+
+def types_on(**names: str) -> str:
+    """Return declarations of shipped types, ``tag="name name"``, each only for machines with its tag.
+
+    Without a tag, their load decides where components begin.
+    """
+    shipped = {one.get("name"): one for one in etree.fromstring(shipped_text()).iter("type")}
+    declared = ""
+    for tag, those in names.items():
+        for name in those.split():
+            shipped[name].set("tags", tag)
+            declared += etree.tostring(shipped[name], encoding="unicode")
+    return f"<types>{declared}</types>"
 
 
 def mission_text(hosts: dict[str, NetworkHost]) -> str:
