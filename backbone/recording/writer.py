@@ -30,8 +30,6 @@ MOST_CHANNELS = 60_000  # MCAP specification, op 0x04: id is a uint16; the rest 
 MOST_SEQUENCE = 2**32  # MCAP specification, op 0x05: sequence is a uint32
 MOST_ASKED = 4096  # chosen: all questions of some seconds; mostly both copies of a question come within less
 MIME_XML = "application/xml"
-
-
 _ASK = f"/{Conversation.ASK}"
 
 
@@ -103,7 +101,8 @@ class RecordingWriter:
         own = message.source, message.sequence, message.stamp_s
         if own in self._asked:
             return True
-        self._asked[own] = None
+        if message.source:  # else the bytes are no message
+            self._asked[own] = None
         if len(self._asked) > MOST_ASKED:
             del self._asked[next(iter(self._asked))]
         return False

@@ -250,6 +250,8 @@ def test_a_question_of_which_asker_and_answerer_send_copies_is_written_once() ->
     for number in (1, 3):
         made.write(at, raw(SOURCES[0], number, story(number)), 5.1)
     made.write(at, raw(SOURCES[1], 1, story(1)), 5.1)
+    for _ in range(2):
+        made.write(at, b"no message", 5.2)
     made.finish()
     assert [(one.source, one.sequence) for one in read(file.getvalue(), "*/ask")] == [
         (SOURCES[0], 0),
@@ -257,6 +259,8 @@ def test_a_question_of_which_asker_and_answerer_send_copies_is_written_once() ->
         (SOURCES[1], 1),
         (SOURCES[0], 2),
         (SOURCES[0], 3),
+        ("", 0),
+        ("", 0),
     ]
 
 
