@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-
 from backbone.component.class_faults import class_faults
 from backbone.component.component import AnyComponent, Component
 from backbone.errors import Refusal
-from backbone.import_faults import import_fault
+from backbone.import_faults import import_fault, object_at
 from backbone.shipped import is_shipped
 
 
@@ -24,9 +22,8 @@ def load_class(class_path: str) -> type[AnyComponent]:
     Raises:
         WrongClassPath: No component class has this path, or the class cannot work.
     """
-    module_name, _, class_name = class_path.partition(":")
     try:
-        found = getattr(importlib.import_module(module_name), class_name)
+        found = object_at(class_path)
     except (ImportError, AttributeError, ValueError) as error:
         told, remedy = import_fault(class_path, error)
         raise WrongClassPath(told, remedy=remedy, class_path=class_path) from error

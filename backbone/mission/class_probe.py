@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import faulthandler
-import importlib
 import inspect
 import os
 import sys
@@ -19,6 +18,7 @@ from backbone.component.component import AnyComponent, Component
 from backbone.component.field_docs import field_docs
 from backbone.component.messages import CommonQuestion
 from backbone.errors import Refusal, complaint, own_place
+from backbone.import_faults import object_at
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import PLANNER, ClassFacts, ParameterFacts, Question, parameters_of
 from backbone.scheduling.own_planner import load_planner
@@ -38,9 +38,8 @@ def facts_of(asked: str) -> ClassFacts:
     class_path, _, driver = asked.partition(" ")
     if class_path == PLANNER:
         return ClassFacts(failure=_planner_fault(driver))
-    module, _, name = class_path.partition(":")
     try:
-        found = getattr(importlib.import_module(module), name)
+        found = object_at(class_path)
     except BaseException as error:  # a module that is being written raises anything, or ends as a program does
         return ClassFacts(failure=f"its module cannot be imported: {_told(error)}")
     if not (isinstance(found, type) and issubclass(found, Component)):
@@ -141,8 +140,7 @@ def _documented(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
 
 def refusal(question: Question) -> str:
     """Return the class's objection to its own parameters among these; empty: none."""
-    module, _, name = question.class_path.partition(":")
-    struct = getattr(importlib.import_module(module), name).parameters_type
+    struct = object_at(question.class_path).parameters_type
     own = {field.encode_name for field in msgspec.structs.fields(struct)}
     try:
         msgspec.convert({key: value for key, value in question.values.items() if key in own}, struct)
@@ -155,8 +153,7 @@ def refusal(question: Question) -> str:
 
 def arranged(question: UnitsQuestion) -> Arranged:
     """Return the arrangement of these units by the class that runs execution units."""
-    module, _, name = question.class_path.partition(":")
-    answer: Arranged = getattr(importlib.import_module(module), name).arrange(question)
+    answer: Arranged = object_at(question.class_path).arrange(question)
     return answer
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from typing import Protocol, cast
 
 from backbone.errors import Refusal
-from backbone.import_faults import import_fault
+from backbone.import_faults import import_fault, object_at
 from backbone.scheduling.planner import Planner
 from backbone.scheduling.table import Table
 
@@ -42,9 +41,8 @@ def load_planner(class_path: str) -> PlannerType | None:
     """
     if not class_path:
         return None
-    module, _, name = class_path.partition(":")
     try:
-        found = getattr(importlib.import_module(module), name)
+        found = object_at(class_path)
     except (Exception, SystemExit) as error:  # a file that is being written raises anything
         told, remedy = import_fault(class_path, error)
         raise WrongPlanner(told, remedy=remedy and MEND, class_path=class_path) from error
@@ -54,7 +52,7 @@ def load_planner(class_path: str) -> PlannerType | None:
     try:
         inspect.signature(found).bind(None, slack_s=0.0)
     except TypeError as error:
-        told = f"{class_path}: its constructor: {error}; it is called as {name}(table, slack_s=…)"
+        told = f"{class_path}: its constructor: {error}; it is called as {found.__name__}(table, slack_s=…)"
         raise WrongPlanner(told, remedy=MEND, class_path=class_path) from error
     return cast(PlannerType, found)
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import importlib
 import logging
 import operator
 from collections.abc import Awaitable, Callable, Mapping
@@ -23,6 +22,7 @@ from msgspec import Meta
 
 from backbone.creator.messages import ProcessFell
 from backbone.errors import LinkError, Refusal
+from backbone.import_faults import object_at
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of, is_component, is_legal
@@ -237,12 +237,11 @@ def message_class(name: str) -> type[Message]:
     """
     if name in NAMED:
         return NAMED[name]
-    module, _, class_name = name.partition(":")
-    if not class_name:
+    if ":" not in name:
         raise ValueError(f"message is {name!r}: write one of {', '.join(sorted(NAMED))}, or package.module:Class")
     try:
-        found = getattr(importlib.import_module(module), class_name)
-    except (ImportError, AttributeError) as error:
+        found = object_at(name)
+    except (ImportError, AttributeError, ValueError) as error:
         raise ValueError(f"message is {name!r}: {error}") from error
     if not (isinstance(found, type) and issubclass(found, Message)):
         raise ValueError(f"message is {name!r}, which is no message")

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
-import operator
 from typing import Annotated, TypeGuard
 
 import msgspec
 
 from backbone.errors import Refusal
-from backbone.import_faults import import_fault
+from backbone.import_faults import import_fault, object_at
 from backbone.keys import Conversation
 from backbone.naming import did_you_mean
 from backbone.quality import Quality
@@ -140,12 +138,12 @@ def load_at(class_path: str) -> object:
     Raises:
         WrongModule: There is no such object, or the file cannot be imported.
     """
-    file, _, name = class_path.partition(":")
     try:
-        return operator.attrgetter(name)(importlib.import_module(file))
+        found: object = object_at(class_path)
     except Exception as error:  # a file that is just being written may raise any exception
         told, remedy = import_fault(class_path, error)
         raise WrongModule(told, remedy=remedy, class_path=class_path) from error
+    return found
 
 
 def load_module_class(class_path: str) -> type[Module]:

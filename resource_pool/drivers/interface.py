@@ -10,7 +10,6 @@ RCs ask ``hasattr`` for optional methods, because a driver may forward its calls
 from __future__ import annotations
 
 import asyncio
-import importlib
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -24,7 +23,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.class_faults import fault_of_method
 from backbone.component.parameter_values import parameters_from
 from backbone.errors import Refusal
-from backbone.import_faults import import_fault
+from backbone.import_faults import import_fault, object_at
 from backbone.ranges import Share
 
 Options = TypeVar("Options", bound=msgspec.Struct)
@@ -283,10 +282,9 @@ def driver_class(path: str, resource: str, protocol: type = object) -> Callable[
     Raises:
         UnknownDriver: There is no such class, or its constructor or methods are not those of this protocol.
     """
-    module_name, _, class_name = path.partition(":")
     try:
-        found: Callable[[DriverSite], Any] = getattr(importlib.import_module(module_name), class_name)
-    except (ImportError, AttributeError) as error:
+        found: Callable[[DriverSite], Any] = object_at(path)
+    except (ImportError, AttributeError, ValueError) as error:
         told, remedy = import_fault(path, error)
         raise UnknownDriver(f"{resource}: {told}", remedy=remedy, class_path=path) from error
     if not callable(found):

@@ -50,3 +50,15 @@ def test_a_path_that_leads_nowhere_is_to_be_corrected(
     with pytest.raises(kind) as refused:
         load(path)
     assert refused.value.remedy == kind.remedy
+
+
+@pytest.mark.parametrize(("load", "kind"), LOADERS)
+@pytest.mark.parametrize("text", ["{}", "{}:", ":{}", "{}:2nd", "{}:Own.", "{}:Own:Own", "../{}:Own", "{} :Own"])
+def test_a_text_that_is_no_path_is_refused_and_imports_nothing(
+    files: Path, load: Callable[[str], object], kind: type[Refusal], text: str
+) -> None:
+    (files / "says_that_it_is_imported.py").write_text("raise SystemExit('imported')")
+    path = text.format("says_that_it_is_imported")
+    with pytest.raises(kind, match=r"no path as package\.module:Class") as refused:
+        load(path)
+    assert path in refused.value.detail
