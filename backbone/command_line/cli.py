@@ -7,7 +7,6 @@ that ``--help`` and ``check`` stay quick. Data goes to stdout, messages to stder
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -44,6 +43,7 @@ from backbone.command_line.recording_commands import compare, record, recording,
 from backbone.command_line.standard_streams import can_redraw
 from backbone.command_line.tool_commands import bridge, metrics
 from backbone.command_line.tree_commands import tree
+from backbone.command_line.unusable_file import open_output
 from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.spoken import counted
@@ -171,7 +171,7 @@ def up(
 
         raise typer.Exit(up_detached(description.name, mission_file, options))
     live = not headless and can_redraw()
-    verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
+    verdict = VerdictPipe(open_output(tell_fd)) if tell_fd is not None else None
     run(lambda: bring_up_on_console(description, options, live=live, verdict=verdict))
 
 

@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, TextIO
 
 from backbone.command_line.standard_streams import HAS_ROOM, NO_ROOM
 from backbone.errors import Refusal
@@ -66,6 +66,19 @@ def new_folder(folder: Path) -> Iterator[Path]:
         raise FileUnusable(f"{folder} exists", remedy="Name a new folder.") from error
     except OSError as error:
         raise unwritable(folder, error) from error
+
+
+def open_output(descriptor: int) -> TextIO:
+    """Return the file of a descriptor that this process inherited.
+
+    Raises:
+        FileUnusable: It is not open for writing.
+    """
+    try:
+        os.write(descriptor, b"")
+        return os.fdopen(descriptor, "w", encoding="utf-8")
+    except OSError as error:
+        raise unwritable(f"descriptor {descriptor}", error) from error
 
 
 def existing(path: Path) -> FileUnusable:

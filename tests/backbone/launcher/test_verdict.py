@@ -6,6 +6,7 @@ import os
 
 import pytest
 
+from backbone.command_line.unusable_file import FileUnusable, open_output
 from backbone.launcher.verdict import VerdictPipe, await_verdict
 
 
@@ -33,3 +34,15 @@ def test_nobody_who_reads_any_more_is_no_bug_of_the_launcher() -> None:
     os.close(reading)
     pipe.talk("mission m comes up")
     pipe.decide(0)
+
+
+@pytest.mark.parametrize("kind", ["closed", "negative", "only for reading"])
+def test_a_descriptor_that_cannot_be_written_is_refused_with_a_remedy(kind: str) -> None:
+    reading, writing = os.pipe()
+    os.close(writing)
+    descriptor = {"closed": writing, "negative": -1, "only for reading": reading}[kind]
+    try:
+        with pytest.raises(FileUnusable, match=f"descriptor {descriptor}: Bad file descriptor"):
+            open_output(descriptor)
+    finally:
+        os.close(reading)
