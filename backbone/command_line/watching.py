@@ -46,6 +46,8 @@ from backbone.wire import Message
 MOST_WAITING_BYTES = 16 * 1024 * 1024  # chosen: far more than a person can read
 ANSWERS_HEARD_S = 0.1  # chosen: longer than overhearing the answers to its own questions, which are not counted
 LOOK_EACH_S = 1.0  # chosen: a rate over a second is readable and recent
+Heard = Callable[[str, Translated, float], None]
+"""Callback with key, message and mission time."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
 
     async with (
         connected(where) as (bus, clock),
-        overhearing(bus, clock, wanted.keys, heard) as subscribed,
+        overhearing(bus, clock, wanted.keys, _of_others(bus, heard)) as subscribed,
         until_ended(bus, clock, wanted.for_s) as ended,
         naming_absences(bus, clock),
     ):
@@ -99,6 +101,16 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
     if dropped := printer.dropped + sum(one.dropped for one in subscribed):
         say(f"incomplete: {counted(dropped, 'message')} came faster than they were read")
     return ExitCode.UNEXPECTED if printer.is_stuck else ExitCode.DONE
+
+
+def _of_others(bus: Bus, heard: Heard) -> Heard:
+    """Return a callback that leaves out what the command itself sends, such as its questions for the time."""
+
+    def others(key: str, message: Translated, at_s: float) -> None:
+        if message.source != bus.source:
+            heard(key, message, at_s)
+
+    return others
 
 
 def _say_that_none_came(wanted: Watched) -> None:
@@ -129,7 +141,10 @@ async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
     def heard(key: str, message: Translated, _at_s: float) -> None:
         traffic.add(key, message.source, message.schema, message.size_bytes)
 
-    async with connected(where) as (bus, clock), overhearing(bus, clock, wanted.keys, heard) as subscribed:
+    async with (
+        connected(where) as (bus, clock),
+        overhearing(bus, clock, wanted.keys, _of_others(bus, heard)) as subscribed,
+    ):
         async with until_ended(bus, clock, wanted.for_s) as ended, naming_absences(bus, clock):
             printer = LinePrinter(ended.set)
             while not ended.is_set():
@@ -197,7 +212,7 @@ async def overhearing(
     bus: Bus,
     clock: Clock,
     keys: tuple[str, ...],
-    heard: Callable[[str, Translated, float], None],
+    heard: Heard,
     classes: Mapping[str, type[Message]] | None = None,
     of: str = "",
 ) -> AsyncIterator[list[Overhearing]]:
