@@ -238,8 +238,8 @@ class Bus(Protocol):
 class Copies(Message, frozen=True):
     """Copies of messages of one key.
 
-    A question comes with its answer or refusal, from the bus of the answerer. A publication that is never dropped comes
-    from the bus of its sender.
+    The bus of an answerer copies each question with its answer or refusal. The bus of an asker copies each question
+    that got no answer. The bus of a sender copies its publications that are never dropped.
 
     Attributes:
         address: Address in the key of the messages.

@@ -55,7 +55,7 @@ class Meetings:
         self._meeting: dict[str, int] = {}
         self._newest: dict[str, int] = {}
         self._inspecting: set[str] = set()
-        self._looks = False
+        self._is_looking = False
         self._ears: dict[str, list[Subscription]] = {}
 
     def are_under_way(self) -> bool:
@@ -71,15 +71,15 @@ class Meetings:
     def _load_heard(self, heard: Envelope[HostLoad]) -> None:
         """Also look again if this creator counts as lost: the news of its return may not have come."""
         self._carry_out(self._book.load_heard(heard.body))
-        if not self._book.is_alive(heard.body.host) and not self._meeting and not self._looks:
-            self._looks = True
+        if not self._book.is_alive(heard.body.host) and not self._meeting and not self._is_looking:
+            self._is_looking = True
             self._begin_later(self._look_once, "look again")
 
     async def _look_once(self) -> None:
         try:
             await self.look_again()
         finally:
-            self._looks = False
+            self._is_looking = False
 
     def _fall_heard(self, heard: Envelope[ProcessFell]) -> None:
         fell = heard.body

@@ -1,8 +1,8 @@
 """Rerun: runs components for real, on virtual time; the recording supplies everything around them.
 
-They get the recorded publications, tokens and questions at their recorded times. Their questions get the recorded
-answers, not earlier than recorded, and none where nobody answered. To each other they send new messages, not the
-recorded ones. All their messages are kept, to be compared with those of the recorded components.
+They get the recorded publications, tokens and questions at their recorded times. Each of their questions gets its
+recorded answer, not earlier than recorded; a question that was recorded without an answer gets none again. Real
+components send new messages to each other. All their messages are kept, to be compared with the recorded ones.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ NANOSECOND_S = 1e-9  # MCAP specification: times are whole nanoseconds
 Known = Mapping[str, type[Message]]
 ComponentType = Callable[[Launch, Bus, Clock], AnyComponent]
 _Answer = tuple[float, Message | None]
-"""The answer to a question, with its time; None: nobody answered, with the time of the question."""
+"""Time and message of an answer; for a question without an answer, its own time and None."""
 _TELL_OF_LAUNCHES = frozenset(schema_of(each) for each in (ComponentState, Parameters, Start, Types))
 
 
@@ -278,7 +278,7 @@ class _RecordedNetwork(LocalNetwork):
         if known:
             at_s, answer = known.popleft() if len(known) > 1 else known[0]
             if answer is None:
-                answered(None)  # its asker tells the question
+                answered(None)  # the asker's bus copies the question
                 return
         elif isinstance(asked.body, Register):
             at_s, answer = loop.time(), Registered()

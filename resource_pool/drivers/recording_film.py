@@ -39,7 +39,7 @@ class RecordingFilm:
             raise HardwareFault(refusal.detail, remedy=refusal.remedy) from refusal
         self._messages = self._recording.messages(self._keys)
         self._taken: Recorded | None = None
-        self._first_s = self._last_s = 0.0
+        self._first_s = 0.0
 
     def advance(self) -> float | None:
         """Take the next picture that is newer than the last one; see ``recorded.Film``."""
@@ -49,9 +49,9 @@ class RecordingFilm:
                 at_s = float(body["captured_s"])
                 if self._taken is None:
                     self._first_s = at_s
-                elif at_s <= self._last_s:
+                elif at_s <= self._taken.body["captured_s"]:
                     continue
-                self._taken, self._last_s = message, at_s
+                self._taken = message
                 return at_s - self._first_s
         return None
 

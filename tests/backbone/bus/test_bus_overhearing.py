@@ -204,8 +204,8 @@ def test_questions_are_told_with_their_answers_while_somebody_overhears_that(on_
     on_bus(law)
 
 
-@pytest.mark.parametrize("ends", ["nobody is there", "no answer in time", "cancelled"])
-def test_a_question_without_an_answer_is_told_once_by_its_asker(on_bus: Runner, ends: str) -> None:
+@pytest.mark.parametrize("ends", ["no responder", "reply timeout", "cancelled"])
+def test_the_asker_copies_a_question_without_an_answer_once(on_bus: Runner, ends: str) -> None:
     async def hang(_asked: Envelope[Any]) -> Message:
         await asyncio.Event().wait()
         raise AssertionError("waits for ever")
@@ -221,13 +221,13 @@ def test_a_question_without_an_answer_is_told_once_by_its_asker(on_bus: Runner, 
 
             async def ask_in_vain(text: str) -> None:
                 asked.append(text)
-                within_s = ASK_S if ends == "nobody is there" else 0.02
+                within_s = ASK_S if ends == "no responder" else 0.02
                 asking = asker.ask(SERVER, Echo(text), Echoed, within_s=within_s)
                 match ends:
-                    case "nobody is there":
+                    case "no responder":
                         with pytest.raises(NoResponder):
                             await asking
-                    case "no answer in time":
+                    case "reply timeout":
                         with pytest.raises(ReplyTimeout):
                             await asking
                     case _:
@@ -246,7 +246,7 @@ def test_a_question_without_an_answer_is_told_once_by_its_asker(on_bus: Runner, 
                     came.clear()
                     await came.wait()
 
-            if ends == "nobody is there":
+            if ends == "no responder":
                 await server.close()
             listener.overhear(Conversation.TOLD, overheard, 1_000_000)
             await until_known(listener, asker)

@@ -8,14 +8,12 @@ from collections.abc import Awaitable, Callable
 import pytest
 from placer_at_work import Mission, on
 
-from backbone.addresses import NAMESERVER, PLACER
+from backbone.addresses import PLACER
 from backbone.creator.messages import (
     CUT_OFF_ENDS_WITHIN_S,
     EndedBy,
 )
 from backbone.errors import ReplyTimeout
-from backbone.keys import Conversation
-from backbone.nameserver.messages import Disappeared
 from backbone.nameserver.service import Nameserver
 from backbone.placer.creators import ANSWER_WITHIN_S
 from backbone.placer.messages import (
@@ -54,32 +52,6 @@ async def lose_host_a(one: Mission, end: Callable[[str], Awaitable[None]]) -> No
     await one.clock.sleep_s(3.0)
     assert await one.placements() == {"w": "b", "scout1": "a"}
     assert one.creators["a"].spawns == ["scout1"]
-
-
-@on("a")
-async def test_a_creator_that_reports_its_load_is_not_lost_whatever_was_said_of_it(one: Mission) -> None:
-    """The news of its return may have been dropped, while the placer was paused."""
-    await one.start("watcher", "w", host="a")
-    one.bus.publish(NAMESERVER, Conversation.EVENTS, Disappeared(one.creators["a"].address))
-    await one.clock.sleep_s(1.0)
-    assert await one.placements() == {"w": ""}
-    one.creators["a"].tell_load()
-    await one.clock.sleep_s(1.0)
-    assert await one.placements() == {"w": "a"}
-    assert one.creators["a"].spawns == ["w"], "it is not started twice"
-
-
-@on("a", "b")
-async def test_a_creator_that_drains_gets_nothing_although_it_reports_its_load(one: Mission) -> None:
-    creator = one.creators["a"]
-    await one.start("watcher", "w", host="a")
-    creator.drain_s = 3.0
-    ending = asyncio.create_task(one.kill("creator-a"))
-    await one.clock.sleep_s(0.5)
-    creator.tell_load()
-    await one.clock.sleep_s(1.0)
-    assert (await one.start("watcher", "w2")).host == "b"
-    await ending
 
 
 @on("a", "b")

@@ -1,4 +1,4 @@
-"""A name in a message from which a receiver makes an address is legal, or nobody gets the message."""
+"""Receivers make addresses from the ARC names in these messages, so a message with an illegal one is malformed."""
 
 from __future__ import annotations
 
