@@ -20,6 +20,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from backbone.atomic_file import freed_later
 from backbone.bus.interface import Clock
 from backbone.operating_system.processes import first_bytes, processor_times_s
 
@@ -114,5 +115,6 @@ def read_vitals(run_directory: str, pid: int) -> Vitals | None:
 
 def forget_heartbeat(run_directory: str, pid: int) -> None:
     """Remove the heartbeat of a process that has ended, if it wrote one."""
-    with suppress(OSError):
-        heartbeat_path(run_directory, pid).unlink()
+    path = heartbeat_path(run_directory, pid)
+    with suppress(OSError), freed_later(path):
+        path.unlink()

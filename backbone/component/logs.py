@@ -21,7 +21,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from backbone.atomic_file import is_at, opened_locked, write_all
+from backbone.atomic_file import freed_later, is_at, opened_locked, write_all
 from backbone.component.repeats import Repeats
 from backbone.operating_system.file_locks import lock_alone_nowait, lock_together
 from backbone.printable_text import printable_lines
@@ -138,7 +138,8 @@ class ComponentLog(logging.Handler):
             if os.fstat(self._output).st_size <= LOG_BYTES:
                 return
             if is_at(self._output, self._path):
-                os.replace(self._path, f"{self._path}{_OLD}")
+                with freed_later(old := self._path.with_name(self._path.name + _OLD)):
+                    os.replace(self._path, old)
             elif not self._path.exists():  # the file was removed
                 os.ftruncate(self._output, 0)
                 return

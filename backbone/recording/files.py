@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import IO
 
+from backbone.atomic_file import freed_later
+
 SPLIT_S = 3_600.0  # chosen: people find an hour by its file name, and the recorder's index of it stays small
 SPLIT_BYTES = 1_000_000_000  # chosen: copying it takes seconds
 
@@ -71,7 +73,8 @@ class RecordingFiles:
                 continue
             self._kept.append(self.path)
             if self._keep and len(self._kept) > self._keep:
-                self._kept.popleft().unlink(missing_ok=True)
+                with freed_later(oldest := self._kept.popleft()):
+                    oldest.unlink(missing_ok=True)
             return opened
 
     def _named(self, number: int) -> Path:

@@ -6,13 +6,14 @@ import fcntl
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 from full_disk import disk_full_at
 
 from backbone import atomic_file
-from backbone.atomic_file import remove_leftover, replace_file
+from backbone.atomic_file import freed_later, remove_leftover, replace_file
 
 KILLED_WHILE_SAVING = """
 import os, pathlib, signal, sys
@@ -59,6 +60,35 @@ def test_the_leftover_of_a_killed_save_is_removed_at_the_next_opening(tmp_path: 
     assert remove_leftover(target)
     assert names(tmp_path) == []
     assert not remove_leftover(target)
+
+
+def test_the_blocks_of_the_old_content_are_freed_in_a_thread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    target = tmp_path / "motions"
+    replace_file(target, b"old")
+    closes: list[str] = []
+    close, replace = os.close, os.replace
+
+    def watched_close(descriptor: int) -> None:
+        closes.append(threading.current_thread().name)
+        close(descriptor)
+
+    def watched_replace(new: Path, old: Path) -> None:
+        links = [one.resolve() for one in Path("/proc/self/fd").iterdir()]
+        assert target in links, "the system would free the blocks before it returns"
+        replace(new, old)
+
+    monkeypatch.setattr(os, "close", watched_close)
+    monkeypatch.setattr(os, "replace", watched_replace)
+    replace_file(target, b"new", is_lasting=False)
+    for thread in threading.enumerate():
+        if thread.name == "free blocks":
+            thread.join()
+    assert (target.read_bytes(), sorted(set(closes))) == (b"new", ["MainThread", "free blocks"])
+
+
+def test_a_file_that_is_missing_has_no_blocks_to_free(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError), freed_later(tmp_path / "missing"):
+        (tmp_path / "missing").unlink()
 
 
 def test_another_writer_at_work_is_neither_disturbed_nor_taken_for_a_leftover(tmp_path: Path) -> None:
