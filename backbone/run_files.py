@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from backbone.authentication import secret_of
 from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
 from backbone.operating_system.file_locks import lock_alone_nowait
+from backbone.operating_system.memory_folder import temporary_folder
 from backbone.operating_system.process_starts import started_s
 
 FILE_NAME = "run.json"
@@ -121,8 +121,7 @@ def run_directory(mission: str) -> Path:
 def kept_directory() -> Path:
     """Return this user's folder for files that outlive a process and belong to no mission of this machine.
 
-    The folder lasts as long as the login session, or as the machine's temporary files if there is no folder for
-    sessions.
+    The folder lasts as long as the login session or, without a folder for sessions, as the machine's temporary files.
 
     Raises:
         Refusal: See ``run_directory``.
@@ -288,7 +287,7 @@ def _directory() -> Path:
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     if runtime and not os.path.isabs(runtime):
         raise RunFolderRelative(f"XDG_RUNTIME_DIR is {runtime!r}, a relative path", directory=runtime)
-    base = Path(runtime) if runtime else Path(tempfile.gettempdir()) / f"scout-backbone-{os.getuid()}"
+    base = Path(runtime) if runtime else temporary_folder() / f"scout-backbone-{os.getuid()}"
     directory = base / "scout-backbone"
     try:
         if not runtime:

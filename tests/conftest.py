@@ -30,6 +30,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem
+from backbone.operating_system.memory_folder import temporary_folder
 
 # Few examples for a person who waits, all of them in CI; both the same in every run, so that two runs of one commit say
 # the same. "search" looks for new ones. No deadline: how long an example takes is the machine's affair.
@@ -191,5 +192,5 @@ def beside() -> Callable[[Component[Any]], AbstractAsyncContextManager[Component
 @pytest.fixture
 def short_path() -> Iterator[Path]:
     """Give a folder with a path short enough for a socket in it; ``tmp_path`` may be too long."""
-    with tempfile.TemporaryDirectory(prefix="s-") as folder:
+    with tempfile.TemporaryDirectory(prefix="s-", dir=temporary_folder()) as folder:
         yield Path(folder)

@@ -8,6 +8,7 @@ Source: S000, "creator"; RAM 2002, "Backbone".
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import ClassVar
 
 import msgspec
@@ -43,6 +44,7 @@ from backbone.creator.signs_of_life import ReadVitals
 from backbone.creator.zygote import Forks, Zygote
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, legal
+from backbone.operating_system.memory_folder import disk_of
 from backbone.wire import Envelope, Message
 
 LONGEST_CLASS_PATH = 200  # chosen: a person reads no more of a refused class path
@@ -117,6 +119,7 @@ class Creator(Component[CreatorParameters]):
 
     async def serve(self) -> None:
         """Publish the host's load."""
+        self._say_if_on_disk()
         while True:
             self._load = self.measure()
             self._publish_load()
@@ -247,6 +250,13 @@ class Creator(Component[CreatorParameters]):
     def _processes_changed(self) -> None:
         self._publish_load()
         self.changed()
+
+    def _say_if_on_disk(self) -> None:
+        if self.launch.run_directory and (disk := disk_of(Path(self.launch.run_directory))):
+            danger = f"keeps its files on a disk ({disk}): while that is slow, robots obey late"
+            self.publish_event(
+                self.name, f"{danger}; set XDG_RUNTIME_DIR to a folder in memory, or unset it", LogLevel.NOTICE
+            )
 
     def measure(self) -> tuple[float, float, int]:
         """Return the busy share of all cores, the used share of memory, and the number of cores."""

@@ -140,7 +140,7 @@ def test_without_a_runtime_directory_a_folder_of_the_user_is_made(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("XDG_RUNTIME_DIR")
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(run_files, "temporary_folder", lambda: tmp_path)
     path = run_files.write(up("iros2001"))
     assert path.is_relative_to(tmp_path / f"scout-backbone-{os.getuid()}")
     assert run_files.find().mission == "iros2001"

@@ -21,6 +21,7 @@ from running_mission import MARK, RunningMission, mission_up
 from three_hosts import NAME, mission_on_three_hosts
 
 from backbone.bus.interface import Bus
+from backbone.operating_system.memory_folder import temporary_folder
 from resource_pool.stop_messages import AskStop, EmergencyStop, StopState
 
 pytestmark = [
@@ -78,8 +79,9 @@ def lines_of(processes: list[psutil.Process]) -> list[str]:
 
 def let_others_enter(folder: Path) -> None:
     """Open all folders around the missions' own, which alone then keeps others out."""
+    tops = {Path(tempfile.gettempdir()), temporary_folder()}
     for parent in (folder, *folder.parents):
-        if str(parent).startswith(tempfile.gettempdir() + "/"):
+        if tops.intersection(parent.parents):
             parent.chmod(0o755)
 
 

@@ -16,6 +16,8 @@ import psutil
 import pytest
 from running_mission import BIN, MISSION_XML, RunningMission, mission_up
 
+from backbone.operating_system import memory_folder
+
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 WHOLE_WITHIN_S = 60.0
 Fill = Callable[[RunningMission], None]
@@ -84,7 +86,7 @@ def fill(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Ite
     if mounted.returncode:
         disk.rmdir()
         pytest.skip("needs the right to mount a small disk")
-    monkeypatch.setattr(tempfile, "tempdir", str(disk))
+    monkeypatch.setattr(memory_folder, "SHARED_MEMORY", disk)
 
     def write_all_of_it(_mission: RunningMission) -> None:
         with (disk / "ballast").open("wb", buffering=0) as ballast, contextlib.suppress(OSError):

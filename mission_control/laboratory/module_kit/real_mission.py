@@ -33,6 +33,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.command_line.status import picture_without_hub
 from backbone.errors import BackboneError, LinkError
+from backbone.operating_system.memory_folder import temporary_folder
 from backbone.picture.health import HealthWord
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
@@ -236,7 +237,7 @@ def mission_up(
     """
     mark = uuid.uuid4().hex
     name = name or f"test-{mark[:8]}"
-    with tempfile.TemporaryDirectory(prefix="scout-test-") as folder:
+    with tempfile.TemporaryDirectory(prefix="scout-test-", dir=temporary_folder()) as folder:
         file = Path(folder) / "mission.xml"
         file.write_text(mission_text(mission, name, change or {}))
         runtime = folder if beside is None else beside.environment["XDG_RUNTIME_DIR"]

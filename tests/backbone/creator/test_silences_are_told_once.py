@@ -19,6 +19,7 @@ from backbone.creator.messages import Spawned
 from backbone.creator.service import Creator
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
+from backbone.wire import Envelope
 
 BLOCKED_S = 1.0
 
@@ -35,7 +36,12 @@ def test_silences_that_come_again_and_again_are_told_once(local_mission: Any, be
             of = (Subsystem.BACKBONE, "creator-lab", "creator", "x:Y", "lab", "", 0.0, 1.0, asked)
             launch = Launch("local", *of, run_directory=str(tmp_path))
             bus, told = network.join(PLACER, clock), list[str]()
-            bus.subscribe(CREATOR, Conversation.LOG, StoryEvent, lambda heard: told.append(heard.body.what))
+
+            def hear(heard: Envelope[StoryEvent]) -> None:
+                if heard.body.subject == "scout1":
+                    told.append(heard.body.what)
+
+            bus.subscribe(CREATOR, Conversation.LOG, StoryEvent, hear)
             async with beside(Creator(launch, network.join(CREATOR, clock), clock, InProcessZygote(network), vitals)):
                 await bus.ask(CREATOR, order("Quiet", "scout1"), Spawned, within_s=30.0)
                 blocks[0] = True
