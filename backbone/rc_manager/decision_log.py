@@ -48,7 +48,7 @@ class DecisionLog:
 
     def begin(self, trace: str) -> None:
         """Open the trace file at this path, if any, and publish the state before the first decision."""
-        self._trace = TraceFile(trace)
+        self._trace = TraceFile(trace, self._trace_stopped)
         if self._trace.stopped_by:
             self._trace_stopped()
         try:
@@ -75,8 +75,7 @@ class DecisionLog:
         """Write and publish one line of a decision."""
         line = dict(record.line)
         self.shares.take(line)
-        if not self._trace.write(line):
-            self._trace_stopped()
+        self._trace.write(line)
         subject = str(line.get("arc") or line.get("id") or "")
         self._note(subject, f"{line['ev']}{': ' + record.cause if record.cause else ''}")
         self._bus.publish(self._bus.source, Conversation.EVENTS, TraceLine(line, record.cause))
@@ -86,10 +85,10 @@ class DecisionLog:
         """Why the trace file ended early; empty: it did not."""
         return f"the trace of the schedule stopped: {self._trace.stopped_by}" if self._trace.stopped_by else ""
 
-    def end(self) -> None:
-        """End the trace file."""
+    async def end(self) -> None:
+        """End the trace file; see ``TraceFile.close``."""
         self._trace.write({"ev": "end", "t": round(self._clock.now_s(), 6)})
-        self._trace.close()
+        await self._trace.close()
 
     def _publish(self, message: Decided | ScheduleSnapshot) -> None:
         self._bus.publish(self._bus.source, Conversation.DECISIONS, message)

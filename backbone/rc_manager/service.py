@@ -151,7 +151,7 @@ class RcManager(Component[RcManagerParameters]):
     async def drain(self) -> None:
         """End all switches; the remaining holds end by lease, or the next RC manager takes them over."""
         await end_tasks(*self._switches.tasks, *self._rcs.starts)
-        self._log.end()
+        await self._log.end()
 
     def statistics(self) -> dict[str, float]:
         """Count decisions and switches; switch times are from revoke to grant, settling not counted."""
