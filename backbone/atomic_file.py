@@ -88,7 +88,10 @@ def freed_later(path: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        threading.Thread(target=os.close, args=(old,), name="free blocks", daemon=True).start()
+        try:
+            threading.Thread(target=os.close, args=(old,), name="free blocks", daemon=True).start()
+        except RuntimeError:  # the system allows no further thread
+            os.close(old)
 
 
 def write_all(descriptor: int, content: bytes) -> None:

@@ -86,6 +86,20 @@ def test_the_blocks_of_the_old_content_are_freed_in_a_thread(tmp_path: Path, mon
     assert (target.read_bytes(), sorted(set(closes))) == (b"new", ["MainThread", "free blocks"])
 
 
+def test_where_no_thread_can_start_the_blocks_are_freed_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    target = tmp_path / "motions"
+    replace_file(target, b"old")
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    before = set(os.listdir("/proc/self/fd"))
+    replace_file(target, b"new", is_lasting=False)
+    assert (target.read_bytes(), set(os.listdir("/proc/self/fd"))) == (b"new", before)
+
+
 def test_a_file_that_is_missing_has_no_blocks_to_free(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), freed_later(tmp_path / "missing"):
         (tmp_path / "missing").unlink()
