@@ -254,9 +254,7 @@ class Creator(Component[CreatorParameters]):
     def _say_if_on_disk(self) -> None:
         if self.launch.run_directory and (disk := disk_of(Path(self.launch.run_directory))):
             danger = f"keeps its files on a disk ({disk}): while that is slow, robots obey late"
-            self.publish_event(
-                self.name, f"{danger}; set XDG_RUNTIME_DIR to a folder in memory, or unset it", LogLevel.NOTICE
-            )
+            self.publish_event(self.name, f"{danger}; set XDG_RUNTIME_DIR to a folder in memory", LogLevel.NOTICE)
 
     def measure(self) -> tuple[float, float, int]:
         """Return the busy share of all cores, the used share of memory, and the number of cores."""

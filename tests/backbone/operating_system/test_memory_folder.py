@@ -26,12 +26,21 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder that stands for the system's one in memory."""
     monkeypatch.setattr(memory_folder, "SHARED_MEMORY", tmp_path)
     monkeypatch.setattr(memory_folder, "MOUNTS", tmp_path / "mountinfo")
+    monkeypatch.setattr(memory_folder, "LOGIND", tmp_path / "seats")
     return tmp_path
 
 
-def test_the_folder_in_memory_is_taken(folder: Path) -> None:
+@pytest.mark.parametrize(
+    ("user", "has_logins", "is_taken"), [(0, True, True), (999, True, True), (1000, True, False), (1000, False, True)]
+)
+def test_the_folder_in_memory_is_taken_if_no_logout_removes_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, user: int, has_logins: bool, is_taken: bool
+) -> None:
     (folder / "mountinfo").write_text(mounts_of(folder, "tmpfs"))
-    assert temporary_folder() == folder
+    if has_logins:
+        (folder / "seats").mkdir()
+    monkeypatch.setattr(os, "getuid", lambda: user)
+    assert temporary_folder() == (folder if is_taken else Path(tempfile.gettempdir()))
 
 
 @pytest.mark.parametrize("kind", ["ext4", "overlay"])
