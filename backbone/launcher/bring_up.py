@@ -35,6 +35,7 @@ from backbone.launcher.preconditions import (
     prepare_endpoint,
     refuse_if_up,
     refuse_paths_of_no_message,
+    require_files,
     require_process_table,
 )
 from backbone.mission.model import MissionDescription
@@ -50,6 +51,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
 
     Raises:
         NoProcessTable: The system does not show its processes.
+        TooFewFiles: The system lets a process open too few files.
         MissionAlreadyUp: A mission of this name runs on this machine.
         FolderInUse: A mission of this name is coming up or ending on this machine.
         PathNotUtf8: The path of a file or folder of the mission is no UTF-8.
@@ -60,6 +62,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     """
     began_s = time.monotonic()
     require_process_table()
+    require_files()
     share_heaps()
     files = [path.absolute() for path in (options.trace, options.record) if path is not None]
     refuse_paths_of_no_message(description.name, description.source, *files)

@@ -10,7 +10,9 @@ from backbone import run_files
 from backbone.authentication import SECRET_NAME, keep_secret, new_secret, socket_endpoint
 from backbone.errors import Refusal
 from backbone.mission.model import Host, MissionDescription
-from backbone.operating_system import processes
+from backbone.operating_system import own_process, processes
+
+LEAST_FILES = 256  # chosen: the hubs of the examples open up to 120; people attach, and processes start again
 
 
 class MissionAlreadyUp(Refusal):
@@ -39,6 +41,24 @@ class NoProcessTable(Refusal):
 
     code = "run.no_processes"
     remedy = f"Mount it: {processes.MOUNTS_TABLE!r}, or start the container or service so that it sees it."
+
+
+class TooFewFiles(Refusal):
+    """The system lets a process open fewer files than a hub needs."""
+
+    code = "run.files"
+    remedy = "Raise the limit: 'ulimit -n 4096' in a shell, LimitNOFILE=4096 in a service."
+
+
+def require_files() -> None:
+    """Return if a process may open as many files as the hub of a small mission needs, else raise.
+
+    Raises:
+        TooFewFiles: It may not.
+    """
+    most = own_process.most_files()
+    if most < LEAST_FILES:
+        raise TooFewFiles(f"a process may open {most} files; the hub needs {LEAST_FILES} or more")
 
 
 def require_process_table() -> None:

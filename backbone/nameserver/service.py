@@ -40,6 +40,8 @@ from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Instruction, 
 from backbone.nameserver.stops_file import UNREADABLE, StopsFile
 from backbone.naming import IllegalName, component_of, is_component, read_claim
 from backbone.operating_system.lingering import ignore_lingering
+from backbone.operating_system.own_process import most_files
+from backbone.operating_system.processes import open_files
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -56,6 +58,9 @@ class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=Tr
     """
 
     listen: list[str] = []
+
+
+SPARE_FILES = 48  # chosen: sixteen further processes; a hub opens three files for each
 
 
 class FixedEndpoints(Refusal):
@@ -99,6 +104,7 @@ class Nameserver(Component[NameserverParameters]):
         otherwise = UNREADABLE if stops is None else None
         self._registry = Registry(clock.now_s(), reconnect_s, CLAIM_WITHIN_S * clock.rate, stops, otherwise)
         self._to_introduce: asyncio.Queue[str] = asyncio.Queue()
+        self._lacks_files = False
         self._registrations = self._refusals = self._appeared = self._disappeared = self._unanswered = 0
 
     async def connect(self) -> None:
@@ -157,7 +163,19 @@ class Nameserver(Component[NameserverParameters]):
             raise
         self._registrations += 1
         self.story.note(name, f"registered as {component.address} on {component.host}, pid {component.pid}")
+        self._say_if_files_run_out()
         return Registered(self._registry.last_stop(name))
+
+    def _say_if_files_run_out(self) -> None:
+        most = most_files()
+        try:
+            used = open_files()
+        except OSError:
+            used = most
+        lacked, self._lacks_files = self._lacks_files, used > most - SPARE_FILES
+        if self._lacks_files and not lacked:
+            danger = f"has {used} of {most} files open: soon no further process can connect"
+            self.publish_event(self.name, f"{danger}; raise the limit of open files", LogLevel.ALARM)
 
     def _claim_changed(self, claim: str, stands: bool) -> None:
         try:

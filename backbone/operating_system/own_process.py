@@ -6,6 +6,7 @@ import ctypes
 import os
 import resource
 import signal
+import sys
 from contextlib import suppress
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME, _PR_SET_CHILD_SUBREAPER = 1, 15, 36  # linux/prctl.h
@@ -37,6 +38,12 @@ def allow_many_files() -> None:
     _now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     with suppress(OSError, ValueError):  # the limit of the whole system was lowered meanwhile
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+
+
+def most_files() -> int:
+    """Return how many files the system lets this process open at once, see ``allow_many_files``."""
+    _now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return sys.maxsize if most == resource.RLIM_INFINITY else most
 
 
 def go_behind_others() -> None:

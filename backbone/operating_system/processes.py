@@ -38,6 +38,15 @@ def threads() -> int:
     return len(os.listdir("/proc/self/task"))
 
 
+def open_files() -> int:
+    """Return the number of open files of this process.
+
+    Raises:
+        OSError: It has as many as the system allows.
+    """
+    return len(os.listdir("/proc/self/fd"))
+
+
 def table_lines() -> dict[int, str]:
     """Return pid → its line, as ``/proc/<pid>/stat`` has it, of all processes that this one may signal.
 

@@ -148,3 +148,14 @@ def test_a_machine_that_shows_no_processes(command: list[str]) -> None:
     assert done.returncode == 4, done.stderr
     assert "refused [run.no_processes]: /proc of this machine cannot be read" in done.stderr
     assert "comes up" not in done.stderr
+
+
+@pytest.mark.processes
+def test_a_system_that_lets_a_process_open_too_few_files() -> None:
+    words = ["sh", "-c", 'ulimit -n 200 && exec "$@"', "sh", sys.executable, "-P", "-m", "backbone.command_line.cli"]
+    command = ["up", str(MISSION_XML), "--headless"]
+    done = subprocess.run([*words, *command], check=False, capture_output=True, text=True, timeout=30)
+    assert done.returncode == 4, done.stderr
+    assert "refused [run.files]: a process may open 200 files" in done.stderr
+    assert "ulimit -n" in done.stderr
+    assert "comes up" not in done.stderr
