@@ -35,7 +35,7 @@ class BusBase(ABC):
         # A dict, not a set: it keeps the order of starts, so tasks that end together end in one order in every run.
         self._tasks: dict[asyncio.Task[object], None] = {}
         self._open_questions: dict[asyncio.Future[Any], None] = {}
-        self._untold: list[tuple[str, Conversation, Sequence[Envelope[Message]]]] = []
+        self._untold: list[tuple[str, Conversation, Sequence[Envelope[Message] | bytes]]] = []
         self._closing: asyncio.Task[None] | None = None
         self._qualities: dict[tuple[str, Conversation], Quality] = {}
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
@@ -122,7 +122,7 @@ class BusBase(ABC):
             return None
         return self.envelope(body)
 
-    def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
+    def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message] | bytes) -> None:
         """Publish copies of these messages, if a component overhears them; copies that are too long are left out."""
         if not self.closed and self.is_overheard(Conversation.TOLD):
             self._untold.append((address, conversation, messages))
@@ -237,10 +237,10 @@ def _report_to_loop(bug: BaseException) -> None:
     asyncio.get_running_loop().call_exception_handler({"message": "bug in a bus handler", "exception": bug})
 
 
-def quoted(messages: Sequence[Envelope[Message]]) -> list[bytes]:
+def quoted(messages: Sequence[Envelope[Message] | bytes]) -> list[bytes]:
     """Return the bytes of these messages; none if one is too long to be quoted."""
     try:
-        written = [write(message) for message in messages]
+        written = [message if isinstance(message, bytes) else write(message) for message in messages]
     except (OversizedMessage, UnwritableMessage) as refusal:
         log.info("no copies for recorders: %s", refusal)
         return []

@@ -310,14 +310,15 @@ class LocalBus(Neighbor):
 async def _answer(server: Serving, asked: Envelope[Message]) -> Envelope[Message] | None:
     if isinstance(asked.body, server.kinds):
         reply = await server.owner.reply_to(asked, server.answer)
-        if reply is not None:
-            server.owner.tell(server.owner.source, Conversation.ASK, asked, reply)
-        return reply
-    server.owner.unreadable += 1
-    schema = schema_of(type(asked.body))
-    accepted = ", ".join(sorted(schema_of(kind) for kind in server.kinds))
-    refusal = UnknownMessage(f"{schema} is not answered here", schema=schema, accepted=accepted)
-    return server.owner.envelope(Refused.of(refusal))
+    else:
+        server.owner.unreadable += 1
+        schema = schema_of(type(asked.body))
+        accepted = ", ".join(sorted(schema_of(kind) for kind in server.kinds))
+        refusal = UnknownMessage(f"{schema} is not answered here", schema=schema, accepted=accepted)
+        reply = server.owner.envelope(Refused.of(refusal))
+    if reply is not None:
+        server.owner.tell(server.owner.source, Conversation.ASK, asked, reply)
+    return reply
 
 
 def _outcome(answering: asyncio.Task[Envelope[Message] | None]) -> Envelope[Message] | None:

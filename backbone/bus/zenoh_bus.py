@@ -195,15 +195,18 @@ class ZenohBus(LifeBus):
         return self._declare(Together(direct, near, queries))
 
     async def _answer(self, reader: Reader[Message], answer: Answer, asked: Asked) -> None:
+        raw = bytes_of(asked.payload)
         try:
-            question = reader.read(bytes_of(asked.payload))
+            question = reader.read(raw)
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
                 asked.answer(self._write_reply(envelope))
                 self.tell(self.source, Conversation.ASK, question, envelope)
         except Refusal as unreadable:
             self.unreadable += 1
-            asked.refuse(write(self.envelope(Refused.of(unreadable))))
+            refusal = self.envelope(Refused.of(unreadable))
+            asked.refuse(write(refusal))
+            self.tell(self.source, Conversation.ASK, bytes(raw), refusal)
         except zenoh.ZError as error:  # the requester or the link is gone
             log.info("a reply of %s was not sent: %s", self.source, error)
         except Exception as bug:  # the reply cannot be encoded
@@ -233,7 +236,7 @@ class ZenohBus(LifeBus):
         outlet.send(envelope, apart, self._loop.time())
         return envelope
 
-    def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
+    def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message] | bytes) -> None:
         """Publish copies if a component overhears; copies of questions with answers go to recorders, too."""
         super().tell(address, conversation, *messages)
         if conversation is Conversation.ASK:

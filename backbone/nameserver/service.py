@@ -48,6 +48,7 @@ log = logging.getLogger(__name__)
 
 HUB_BEGAN = "hub-began"
 INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer in this time hangs; then only its token is known
+SPARE_FILES = 48  # chosen: sixteen further processes; a hub opens three files for each
 
 
 class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -58,9 +59,6 @@ class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=Tr
     """
 
     listen: list[str] = []
-
-
-SPARE_FILES = 48  # chosen: sixteen further processes; a hub opens three files for each
 
 
 class FixedEndpoints(Refusal):

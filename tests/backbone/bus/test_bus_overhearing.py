@@ -14,6 +14,7 @@ from bus_laws import (
     Heard,
     Net,
     News,
+    Other,
     Runner,
     TooLoud,
     echo,
@@ -25,7 +26,7 @@ from bus_laws import (
 from backbone.bus.interface import Copies, Told
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation
-from backbone.wire import Envelope, Message, Reader, Refused, write
+from backbone.wire import Envelope, Message, Reader, Refused, UnknownMessage, write
 
 
 def test_a_conversation_is_overheard_whoever_says_what_in_it(on_bus: Runner) -> None:
@@ -200,6 +201,34 @@ def test_questions_are_told_with_their_answers_while_somebody_overhears_that(on_
             subscribed.close()
             assert server.statistics().told > 0
             assert server.statistics().published == published, "copies are counted apart"
+
+    on_bus(law)
+
+
+def test_a_question_that_is_not_answered_here_is_told_with_its_refusal(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        listener, told, came = net.join(THIRD), list[Copies](), asyncio.Event()
+
+        def overheard(_key: str, raw: bytes) -> None:
+            told.extend(Reader(Told).read(raw).body.copies)
+            came.set()
+
+        async with pair(net, echo) as (asker, server):
+            listener.overhear(Conversation.TOLD, overheard, 1_000_000)
+            await until_known(listener, server)
+
+            async def told_one() -> None:
+                while not told:  # the answerer knows of a listener a moment later
+                    with pytest.raises(UnknownMessage):
+                        await asker.ask(SERVER, Other(), Echoed, within_s=ASK_S)
+                    await net.clock.sleep_s(0.02)
+
+            await within(told_one(), "the question and its refusal")
+            question, reply = (
+                Reader(kind).read(raw) for kind, raw in zip((Other, Refused), told[0].messages, strict=True)
+            )
+            assert (question.source, question.body) == (ASKER, Other())
+            assert (reply.source, reply.cause, reply.body.code) == (SERVER, "", UnknownMessage.code)
 
     on_bus(law)
 
