@@ -161,7 +161,8 @@ class Nameserver(Component[NameserverParameters]):
             raise
         self._registrations += 1
         self.story.note(name, f"registered as {component.address} on {component.host}, pid {component.pid}")
-        self._say_if_files_run_out()
+        if self.launch.run_directory:  # else it is no hub of its own process
+            self._say_if_files_run_out()
         return Registered(self._registry.last_stop(name))
 
     def _say_if_files_run_out(self) -> None:

@@ -86,7 +86,8 @@ def fill(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Ite
     if mounted.returncode:
         disk.rmdir()
         pytest.skip("needs the right to mount a small disk")
-    monkeypatch.setattr(memory_folder, "SHARED_MEMORY", disk)
+    monkeypatch.setattr(memory_folder, "SHARED_MEMORY", disk)  # for the mission's folder
+    monkeypatch.setattr(tempfile, "tempdir", str(disk))  # for the trace
 
     def write_all_of_it(_mission: RunningMission) -> None:
         with (disk / "ballast").open("wb", buffering=0) as ballast, contextlib.suppress(OSError):
