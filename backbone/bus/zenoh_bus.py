@@ -195,9 +195,10 @@ class ZenohBus(LifeBus):
         return self._declare(Together(direct, near, queries))
 
     async def _answer(self, reader: Reader[Message], answer: Answer, asked: Asked) -> None:
-        raw = bytes_of(asked.payload)
+        came = list[bytes]()
         try:
-            question = reader.read(raw)
+            came.append(bytes_of(asked.payload))
+            question = reader.read(came[0])
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
                 asked.answer(self._write_reply(envelope))
@@ -206,7 +207,7 @@ class ZenohBus(LifeBus):
             self.unreadable += 1
             refusal = self.envelope(Refused.of(unreadable))
             asked.refuse(write(refusal))
-            self.tell(self.source, Conversation.ASK, bytes(raw), refusal)
+            self.tell(self.source, Conversation.ASK, *map(bytes, came), refusal)
         except zenoh.ZError as error:  # the requester or the link is gone
             log.info("a reply of %s was not sent: %s", self.source, error)
         except Exception as bug:  # the reply cannot be encoded

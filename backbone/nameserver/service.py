@@ -161,7 +161,7 @@ class Nameserver(Component[NameserverParameters]):
             raise
         self._registrations += 1
         self.story.note(name, f"registered as {component.address} on {component.host}, pid {component.pid}")
-        if self.launch.run_directory:  # else it is no hub of its own process
+        if self.launch.endpoint:  # else it shares the process of its mission, without a hub
             self._say_if_files_run_out()
         return Registered(self._registry.last_stop(name))
 

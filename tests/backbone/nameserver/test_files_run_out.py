@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,7 +19,7 @@ from backbone.nameserver.service import SPARE_FILES
 MOST = 1024
 
 
-def said_with(monkeypatch: pytest.MonkeyPatch, beside: Any, folder: Path, used: list[int | None]) -> list[StoryEvent]:
+def said_with(monkeypatch: pytest.MonkeyPatch, beside: Any, used: list[int | None]) -> list[StoryEvent]:
     """Return what the nameserver publishes if it has so many open files at each registration; None: all of them."""
     left = iter(used)
 
@@ -38,7 +37,7 @@ def said_with(monkeypatch: pytest.MonkeyPatch, beside: Any, folder: Path, used: 
         network, clock = LocalNetwork("m"), VirtualClock()
         ear = network.join("ui_console/ear", clock)
         ear.subscribe(NAMESERVER, Conversation.LOG, StoryEvent, lambda heard: said.append(heard.body))
-        async with beside(nameserver(network, str(folder))):
+        async with beside(nameserver(network, endpoint="a hub's")):
             for number in range(len(used)):
                 async with beside(probe(network, f"scout{number}")):
                     await clock.sleep_s(1.0)
@@ -48,18 +47,16 @@ def said_with(monkeypatch: pytest.MonkeyPatch, beside: Any, folder: Path, used: 
     return [event for event in said if "files" in event.what]
 
 
-def test_it_is_said_once_with_the_numbers(monkeypatch: pytest.MonkeyPatch, beside: Any, tmp_path: Path) -> None:
+def test_it_is_said_once_with_the_numbers(monkeypatch: pytest.MonkeyPatch, beside: Any) -> None:
     few = MOST - SPARE_FILES
-    said = said_with(monkeypatch, beside, tmp_path, [few, few + 1, few + 4])
+    said = said_with(monkeypatch, beside, [few, few + 1, few + 4])
     assert [event.what.partition(":")[0] for event in said] == [f"has {few + 1} of {MOST} files open"]
     assert said[0].level is LogLevel.ALARM
 
 
-def test_it_is_said_again_when_files_run_out_again(
-    monkeypatch: pytest.MonkeyPatch, beside: Any, tmp_path: Path
-) -> None:
-    assert len(said_with(monkeypatch, beside, tmp_path, [MOST, 100, None])) == 2
+def test_it_is_said_again_when_files_run_out_again(monkeypatch: pytest.MonkeyPatch, beside: Any) -> None:
+    assert len(said_with(monkeypatch, beside, [MOST, 100, None])) == 2
 
 
-def test_a_hub_with_files_to_spare_says_nothing(monkeypatch: pytest.MonkeyPatch, beside: Any, tmp_path: Path) -> None:
-    assert not said_with(monkeypatch, beside, tmp_path, [70, 73, 76])
+def test_a_hub_with_files_to_spare_says_nothing(monkeypatch: pytest.MonkeyPatch, beside: Any) -> None:
+    assert not said_with(monkeypatch, beside, [70, 73, 76])

@@ -66,9 +66,9 @@ def probe(network: LocalNetwork, name: str = "scout1", kind: type[Probe] = Probe
     return kind(launch, network.join(launch.address, clock), clock)
 
 
-def nameserver(network: LocalNetwork, run_directory: str = "") -> Nameserver:
+def nameserver(network: LocalNetwork, run_directory: str = "", endpoint: str = "") -> Nameserver:
     address = (Subsystem.BACKBONE, "nameserver", "nameserver")
-    launch = Launch("local", *address, "x:Y", "a", "", 0.0, 1.0, run_directory=run_directory)
+    launch = Launch("local", *address, "x:Y", "a", endpoint, 0.0, 1.0, run_directory=run_directory)
     clock = VirtualClock()
     return Nameserver(launch, network.join(launch.address, clock), clock)
 
