@@ -31,6 +31,16 @@ def test_a_good_mission_file_is_fine(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.parametrize("level", ["1", "2"])
+def test_an_interpreter_that_drops_assertions_and_docstrings_reads_mission_files(
+    level: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONOPTIMIZE", level)
+    monkeypatch.setenv("PYTHONPYCACHEPREFIX", str(tmp_path))
+    done = command("scout-backbone", "check", str(MISSION_XML), folder=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 BRINGS_UP = [("up", "--headless", "--detach"), ("up",), ("check",)]
 
 

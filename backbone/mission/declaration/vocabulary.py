@@ -87,7 +87,8 @@ def _collect(tag: str, schema: Schema, definitions: Schema, found: dict[str, Ele
             children[name], inside[name] = (int(one.get("minItems", 0)), MANY), items
         else:
             attributes[name] = _attribute(one, is_required=name in required)
-    found[tag] = ElementRule(attributes, children, " ".join(schema["description"].split()))
+    documentation = " ".join(schema.get("description", "").split())  # none with python -OO, which drops docstrings
+    found[tag] = ElementRule(attributes, children, documentation)
     for child, its_schema in inside.items():
         if child not in found:
             _collect(child, its_schema, definitions, found)
