@@ -14,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 
+from backbone import unexpected_ends
 from backbone.atomic_file import is_at, opened_locked, replace_file
 from backbone.authentication import secret_of
 from backbone.errors import Refusal
@@ -163,6 +164,7 @@ def prepare(mission: str) -> Path:
     directory = run_directory(mission)
     _remove_what_dead_zygotes_left(directory)
     try:
+        unexpected_ends.forget(directory)
         (directory / "log").mkdir(mode=0o700, parents=True, exist_ok=True)
         directory.chmod(0o700)
         trial = directory / ".trial"
@@ -210,6 +212,12 @@ def write(run_file: RunFile) -> Path:
     return path
 
 
+def unlist(mission: str) -> None:
+    """Let no command find the mission any more: its launcher ends it. Idempotent."""
+    with contextlib.suppress(OSError):
+        (run_directory(mission) / FILE_NAME).unlink()
+
+
 def remove(mission: str) -> None:
     """Remove the mission's folder and its files. Idempotent."""
     shutil.rmtree(run_directory(mission), ignore_errors=True)
@@ -222,21 +230,29 @@ def find(mission: str | None = None) -> RunFile:
         mission: Its name; None: the only mission.
 
     Raises:
-        MissionNotUp: The mission is not up; the detail names the missions that are up.
+        MissionNotUp: The mission is not up; the detail names the missions that are up, and says how this one, or the
+            last one, ended unexpectedly.
         SeveralMissions: ``mission`` is None and several missions are up.
     """
     up = find_all()
     names = ", ".join(run_file.mission for run_file in up)
     if mission is None:
         if not up:
-            raise MissionNotUp("no mission is up on this machine for this user")
+            raise MissionNotUp(f"no mission is up on this machine for this user{_how_ended(None)}")
         if len(up) > 1:
             raise SeveralMissions(f"several missions are up: {names}", missions=names)
         return up[0]
     for run_file in up:
         if run_file.mission == mission:
             return run_file
-    raise MissionNotUp(f"mission {mission!r} is not up; up: {names or 'none'}", mission=mission, missions=names)
+    told = f"mission {mission!r} is not up; up: {names or 'none'}{_how_ended(mission)}"
+    raise MissionNotUp(told, mission=mission, missions=names)
+
+
+def _how_ended(mission: str | None) -> str:
+    """Return the unexpected end of the mission as the last part of a sentence; empty: none is known."""
+    end = unexpected_ends.newest(_directory(), mission)
+    return f"; {end}" if end is not None else ""
 
 
 def secret(run_file: RunFile) -> str:

@@ -18,7 +18,7 @@ from backbone.bus import zenoh_threads
 from backbone.bus.interface import Bus, Clock
 from backbone.command_line.terminal_output import TerminalFile, TerminalOutput
 from backbone.component.messages import ComponentState, StoryEvent
-from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.errors import BackboneError, LinkError, Refusal, complaint
 from backbone.keys import Conversation
 from backbone.launcher.bring_up import run_mission
 from backbone.launcher.core_launches import UpOptions
@@ -110,6 +110,12 @@ class ConsoleObserver:
         if self._verdict is not None:
             self._verdict.talk(f"could not be started: {error}")
         self.decide(complaint_of(error)[1])
+
+    def broke(self, bug: Exception) -> None:
+        """Send the bug to the command that waits; Python prints it here."""
+        if self._verdict is not None:
+            self._verdict.talk(f"the launcher failed: {complaint(bug)}")
+        self.decide(ExitCode.UNEXPECTED)
 
     def decide(self, exit_code: int) -> None:
         """Send the exit code to the command that waits, unless it has one already."""
@@ -259,6 +265,9 @@ async def _bring_up(description: MissionDescription, options: UpOptions, observe
         raise
     except BackboneError as error:
         outcome = Outcome(failure=error)
+    except Exception as bug:
+        observer.broke(bug)
+        raise
     for last in last_lines(outcome):
         observer.tell(last)
     code = ExitCode.DONE if outcome.went_well else ExitCode.MISSION_FAILED

@@ -33,6 +33,7 @@ from typing import NoReturn, assert_never
 
 import msgspec
 
+from backbone import unexpected_ends
 from backbone.component.launch import Launch
 from backbone.component.logs import redirect
 from backbone.component.process import EXIT_BUG, run_process
@@ -41,7 +42,7 @@ from backbone.creator import process_table
 from backbone.operating_system import own_process, processes
 from backbone.operating_system.heaps import share_heaps
 from backbone.ranges import ExitCode, Pid, Signal, Text
-from backbone.run_files import ENDED
+from backbone.run_files import ENDED, FILE_NAME
 from backbone.wire import Message
 
 log = logging.getLogger(__name__)
@@ -365,6 +366,8 @@ class _ZygoteProcess:
         if not self._settings.run_directory:
             return None
         directory = Path(self._settings.run_directory)
+        if (directory / FILE_NAME).exists():  # a launcher that ends its mission removes it before
+            unexpected_ends.keep(directory, f"its launcher, process {self._settings.parent}, was killed")
         hidden = directory.with_name(f".{directory.name}{ENDED}{self._own_pid}")
         try:
             directory.rename(hidden)

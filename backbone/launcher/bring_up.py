@@ -13,8 +13,9 @@ import asyncio
 import os
 import signal
 import time
+from pathlib import Path
 
-from backbone import run_files
+from backbone import run_files, unexpected_ends
 from backbone.addresses import LAUNCHER
 from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
@@ -81,6 +82,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
         try:
             return await _with_hub(zygote, own, clock, description, options, observer, began_s)
         finally:
+            run_files.unlist(description.name)
             await zygote.close()
 
 
@@ -123,7 +125,11 @@ async def _with_hub(
     )
     try:
         await _run(own, clock, launcher, recorder)
+    except Exception as bug:
+        launcher.outcome.failure = launcher.outcome.failure or bug
+        raise
     finally:
+        unexpected_ends.keep(Path(own.run_directory), launcher.outcome.unexpected_end)
         launcher.outcome.ended += await keeper.close()
     return launcher.outcome
 

@@ -182,6 +182,7 @@ class Launcher(Component[NoParameters]):
 
     def end(self, reason: str, *, at_once: bool = False) -> None:
         """Run the last branch, then end. Without a branch, at a second order, or if ``at_once``, end now."""
+        self.outcome.order = self.outcome.order or reason
         if self._last.ordered(self.clock.now_s(), is_up=self._is_up, at_once=at_once):
             self._last_is_over.set()
             super().end(reason)

@@ -8,7 +8,10 @@ from typing import Protocol
 
 from backbone.bus.interface import Bus, Clock
 from backbone.creator.messages import EndedBy, ProcessEnded, StartFailed
+from backbone.errors import BackboneError, complaint
 from backbone.picture.words import NAMES_SHOWN, counted_names
+
+HANG_UP = "SIGHUP"  # a signal's name: the order of a terminal that is closed
 
 
 def with_signals(ended: Sequence[ProcessEnded]) -> str:
@@ -33,11 +36,13 @@ class Outcome:
     Attributes:
         ready_after_s: Seconds of the machine from the start until all was ready; None if it was never ready.
         failure: Why it failed; None if it did not fail.
+        order: The first order to end.
         ended: How each process ended, in the order of their ends.
     """
 
     ready_after_s: float | None = None
     failure: BaseException | None = None
+    order: str = ""
     ended: list[ProcessEnded] = field(default_factory=list)
 
     @property
@@ -46,6 +51,17 @@ class Outcome:
         told = str(self.failure)
         name = str(self.failure.facts.get("name", "")) if isinstance(self.failure, StartFailed) else ""
         return told if told.startswith(name) else f"{name}: {told}"
+
+    @property
+    def unexpected_end(self) -> str:
+        """What ended a mission that was up, if no person or service manager ordered its end; else empty."""
+        if self.ready_after_s is None:
+            return ""
+        if isinstance(self.failure, BackboneError):
+            return self.why_failed
+        if self.failure is not None:
+            return f"its launcher failed: {complaint(self.failure)}"
+        return f"{self.order}, as its terminal was closed" if self.order == HANG_UP else ""
 
     @property
     def pushed(self) -> list[ProcessEnded]:

@@ -64,7 +64,8 @@ def test_the_mission_goes_down_and_its_recording_is_whole(short_path: Path, tmp_
             assert up.wait(ENDED_WITHIN_S) == 0
         finally:
             up.kill()
-    assert os.listdir(short_path / "scout-backbone") == []
+    [end] = (short_path / "scout-backbone").iterdir()
+    assert "SIGHUP, as its terminal was closed" in end.read_text()
     with open_file(recording) as file:
         assert Recording(file).contents().messages > 0
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from running_mission import RunningMission, mission_up, wait_gone
+from running_mission import RunningMission, asked, mission_up, wait_gone
 
 from backbone.bus.interface import Bus
 from backbone.errors import LinkError, Refusal
@@ -111,6 +111,8 @@ def test_nothing_is_left_after_the_death_of_the_launcher() -> None:
         left = wait_gone(mission.environment["SCOUT_TEST_MARK"], 3.0)
         assert not left, f"{left}\n{mission.story()}"
         assert not mission.directory.exists()
+        status = asked(mission, "status")
+        assert f"its launcher, process {mission.launcher.pid}, was killed" in status.stderr
 
 
 @pytest.mark.thorough
