@@ -93,6 +93,12 @@ def code_of(refusal: Refusal) -> str:
     return str(refusal.facts.get("code", refusal.code)) if isinstance(refusal, UnknownRefusal) else refusal.code
 
 
+NO_MORE_TASKS = "no more processes and threads may begin: see ulimit -u and pids.max"
+"""The limit of the account (setrlimit(2), RLIMIT_NPROC), or that of its container or service (cgroup) is reached."""
+
+_NO_THREAD = ("can't start new thread", "can't spawn worker thread")  # of CPython, and of zenoh's runtime, tokio
+
+
 def named(error: BaseException) -> str:
     """Return the class and the text of an exception; a class whose text fails is named all the same.
 
@@ -116,8 +122,12 @@ def complaint(error: BaseException, most: int = MOST_CHARACTERS) -> str:
     Example:
         >>> complaint(ValueError("no picture"))
         'ValueError: no picture'
+        >>> complaint(RuntimeError("can't start new thread"))
+        "RuntimeError: can't start new thread; no more processes and threads may begin: see ulimit -u and pids.max"
     """
     told = printable(" ".join(named(error).split()), most)
+    if any(text in told for text in _NO_THREAD):
+        told = f"{told}; {NO_MORE_TASKS}"
     frames = list(walk_tb(error.__traceback__))
     inmost = f"{frames[-1][0].f_code.co_filename}, line {frames[-1][1]}" if frames else ""
     place = own_place(error) or printable(inmost)

@@ -39,6 +39,7 @@ from backbone.component.logs import redirect
 from backbone.component.process import EXIT_BUG, run_process
 from backbone.component.shared_process import run_shared_process
 from backbone.creator import process_table
+from backbone.errors import NO_MORE_TASKS
 from backbone.operating_system import own_process, processes
 from backbone.operating_system.heaps import share_heaps
 from backbone.ranges import ExitCode, Pid, Signal, Text
@@ -270,7 +271,7 @@ class _ZygoteProcess:
         try:
             pid = os.fork()
         except OSError as error:
-            return ForkFailed(str(error))
+            return ForkFailed(why_not_forked(error))
         if pid == 0:
             self._become(launch)
         self._live.add(pid)
@@ -374,6 +375,18 @@ class _ZygoteProcess:
         except FileNotFoundError:
             return None
         return hidden
+
+
+def why_not_forked(error: OSError) -> str:
+    """Return why the system refused a fork.
+
+    Example:
+        >>> why_not_forked(BlockingIOError(11, "Resource temporarily unavailable"))
+        'Resource temporarily unavailable; no more processes and threads may begin: see ulimit -u and pids.max'
+        >>> why_not_forked(OSError(12, "Cannot allocate memory"))
+        '[Errno 12] Cannot allocate memory'
+    """
+    return f"{error.strerror}; {NO_MORE_TASKS}" if isinstance(error, BlockingIOError) else str(error)
 
 
 def _only_wake(_number: int, _frame: object) -> None:
