@@ -10,11 +10,13 @@ import contextlib
 import time
 from datetime import datetime
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
 from backbone.atomic_file import replace_file
 
+LATEST_S = 250_000_000_000.0  # in the year 9892; dates end with the year 9999
 SUFFIX = ".end"  # the file of a mission is .<mission>.end, no legal name of a mission
 
 
@@ -27,7 +29,7 @@ class UnexpectedEnd(msgspec.Struct, frozen=True):
     """
 
     mission: str
-    at_s: float
+    at_s: Annotated[float, msgspec.Meta(ge=0.0, lt=LATEST_S)]
     how: str
 
     def __str__(self) -> str:

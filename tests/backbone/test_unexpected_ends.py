@@ -57,7 +57,9 @@ def test_a_mission_that_is_up_is_found_beside_ends_of_others(directory: Path) ->
 
 def test_what_another_release_has_kept_is_no_fault(directory: Path) -> None:
     unexpected_ends.keep(directory / "night", "SIGHUP")
-    (directory / ".night.end").write_bytes(b'{"mission":"night"}')
+    for content in (b'{"mission":"night"}', b'{"mission":"night","at_s":1e300,"how":"SIGHUP"}', b"\xff"):
+        (directory / ".night.end").write_bytes(content)
+        assert refusal() == "no mission is up on this machine for this user"
     (directory / ".day.end").mkdir()
     assert refusal() == "no mission is up on this machine for this user"
 
