@@ -212,10 +212,10 @@ def write(run_file: RunFile) -> Path:
     return path
 
 
-def unlist(mission: str) -> None:
-    """Let no command find the mission any more: its launcher ends it. Idempotent."""
+def unlist(directory: Path) -> None:
+    """Let no command find the mission of this folder any more: its launcher ends it. Idempotent."""
     with contextlib.suppress(OSError):
-        (run_directory(mission) / FILE_NAME).unlink()
+        (directory / FILE_NAME).unlink()
 
 
 def remove(mission: str) -> None:

@@ -82,7 +82,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
         try:
             return await _with_hub(zygote, own, clock, description, options, observer, began_s)
         finally:
-            run_files.unlist(description.name)
+            run_files.unlist(directory)
             await zygote.close()
 
 

@@ -51,7 +51,8 @@ def test_a_mission_that_is_up_is_found_beside_ends_of_others(directory: Path) ->
     run_files.prepare("day")
     run_files.write(RunFile("day", "tcp/127.0.0.1:7447", os.getpid(), 12.5, 2.0, "lab", "/missions/m.xml"))
     assert run_files.find().mission == "day"
-    run_files.unlist("day")
+    run_files.unlist(directory / "day")
+    run_files.unlist(directory / "day")
     assert "mission night ended" in refusal()
 
 
