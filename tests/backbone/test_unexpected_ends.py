@@ -1,4 +1,4 @@
-"""A mission that nobody ordered to end leaves one sentence for whoever looks for it."""
+"""The launcher or its zygote keeps how a mission ended unexpectedly, and a command that finds no mission quotes it."""
 
 from __future__ import annotations
 
